@@ -17,11 +17,7 @@ import pytest
 from discovery import in_a_hurry
 from file_budget import pytest_runtest_makereport  # noqa: F401
 from hypothesis import settings
-from listed_skips import (  # noqa: F401
-    pytest_addoption,
-    pytest_sessionfinish,
-    pytest_terminal_summary,
-)
+from listed_skips import pytest_addoption, pytest_sessionfinish, pytest_terminal_summary  # noqa: F401
 from ros_processes import environment, reserve_domain
 
 from pprs_dynamics.system.threads import use_one_thread

@@ -11,11 +11,7 @@ import pytest
 
 from benchmarks.naming.entrants.controls import perfect
 from benchmarks.naming.generate import draws
-from benchmarks.naming.problems import (
-    Answer,
-    Named,
-    Truth,
-)
+from benchmarks.naming.problems import Answer, Named, Truth
 from benchmarks.naming.scoring import FIGURES, Scored, figures, judge
 
 pytestmark = pytest.mark.slow

@@ -31,7 +31,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.model.one_pass import forces_kernel
+from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, forces_kernel
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -220,7 +220,7 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     one_pass = model._one_pass
     assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    forces_kernel(_counted(one_pass.parameters.named), 0, table, _CountedTable())
+    forces_kernel(_counted(one_pass.parameters.named), 0, table, NO_LOAD, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

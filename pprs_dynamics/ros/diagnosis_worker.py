@@ -1,29 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The monitor's live diagnosis: windows of the stream, diagnosed in a process of its own.
-
-The process has a low priority and one thread; the node only copies arrays to it and looks,
-now and then, whether there is an answer. It is ended with the node, and started anew where it
-ended by itself.
-"""
+"""The monitor's live diagnosis: windows of the stream, diagnosed in a process of its own."""
 
 from __future__ import annotations
 
-import os
-import signal
 from collections import deque
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
-from multiprocessing import get_context, resource_tracker
-from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.system.worker_process import EndedError, WorkerProcess
 
 if TYPE_CHECKING:
+    from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.measurement.files.recording import Recording
 
 # A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
@@ -97,12 +89,13 @@ class StreamWindows:
 
 
 class DiagnosisWorker:
-    """A process that diagnoses one window after the other, and remembers what it found."""
+    """A process that diagnoses one window after the other, and remembers what it found.
+
+    It is ended with the node, and started anew where it ended by itself.
+    """
 
     def __init__(self) -> None:
-        self._process: Any = None
-        self._pipe: Any = None
-        self._sending: Thread | None = None
+        self._process: WorkerProcess | None = None
         self.busy = False
 
     def submit(self, values: Mapping[str, Any], source: str, samples: StreamWindow,
@@ -111,19 +104,8 @@ class DiagnosisWorker:
 
         `reference` names the reference runs.
         """
-        if self._process is None or not self._process.is_alive():
-            self.close()
-            _start_tracker()
-            context = get_context('spawn')
-            self._pipe, theirs = context.Pipe()
-            self._process = context.Process(target=_work, args=(theirs,), daemon=True)
-            self._process.start()
-            theirs.close()
-        # A pipe holds less than a window, and a process that begins reads it after seconds.
-        self._sending = Thread(target=_send, args=(
-            self._pipe, (dict(values), source, reference, samples)),
-                               daemon=True)
-        self._sending.start()
+        self._process = self._process or WorkerProcess(LOW_PRIORITY)
+        self._process.submit(_diagnosed, (dict(values), source, reference), samples)
         self.busy = True
 
     def poll(self) -> dict[str, Any] | None:
@@ -132,76 +114,53 @@ class DiagnosisWorker:
         With a sentence as `error` where the window was not diagnosed; with that alone where
         nothing is known any more.
         """
-        if not self.busy:
+        if self._process is None or not self.busy:
             return None
         try:
-            if not self._pipe.poll():
-                return None
-            self.busy = False
-            return self._pipe.recv()
-        except (EOFError, OSError):
-            self.busy = False
+            answer: dict[str, Any] = self._process.answer(0.0)
+        except TimeoutError:
+            return None
+        except EndedError:
+            self.close()
             return {'error': 'the process that diagnoses has ended; what it knew is forgotten'}
+        self.busy = False
+        return answer
 
     def close(self) -> None:
         """End the process, whatever it does."""
         if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            if self._sending is not None:
-                self._sending.join()
-            self._pipe.close()
+            self._process.close()
         self._process, self.busy = None, False
 
 
-def _start_tracker() -> None:
-    """Start multiprocessing's resource tracker and restore the signal mask.
+Asked = tuple[dict[str, Any], str, tuple[str, ...]]
+"""Values of the model, its file, and reference runs."""
 
-    The tracker unblocks SIGINT and SIGTERM in this thread, where they would end the node without a
-    last command. `StopSignals` waits for them in another thread.
-    """
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+_LAST: list[tuple[Asked, LiveDiagnosis]] = []  # at most one, in the process that diagnoses
 
 
-def _send(pipe: Any, window: Any) -> None:
-    with suppress(OSError):  # it has ended, as `poll` will tell
-        pipe.send(window)
-
-
-def _work(pipe: Any) -> None:
-    """Answer windows until the pipe is closed."""
-    with suppress(OSError):
-        os.nice(LOW_PRIORITY)
+def _diagnosed(asked: Asked, samples: StreamWindow, progress: Any) -> dict[str, Any]:
+    """Return the answer to a window, with what earlier windows of the same model said."""
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.inference.fit.reference_runs import read_reference
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
-    def said(live: LiveDiagnosis) -> dict[str, Any]:
-        return {**live.to_dict(), ADOPTED: live.adopted()}
-
-    known: tuple[dict[str, Any], str, tuple[str, ...]] | None = None
-    while True:
-        try:
-            values, source, reference, samples = pipe.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            if known != (values, source, reference):
-                model = DriveModel.from_parameters(values, source)
-                live = LiveDiagnosis(model, reference=(
-                    read_reference(model, reference) if reference else None))
-                known = values, source, reference
-            live = live.with_window(samples.recording('the last window', live.model.drives),
-                                    int(samples.stamp[0]) / 1e9)
-            answer = said(live)
-        except PprsError as error:
-            # What is known of this model stands, though this window says nothing.
-            kept = {**said(live), 'withdrawn': []} if known == (
-                values, source, reference) else {}
-            answer = {**kept, 'error': str(error)}
-        pipe.send(answer)
+    failed: dict[str, Any] = {}
+    try:
+        if not _LAST or _LAST[0][0] != asked:
+            _LAST.clear()
+            values, source, runs = asked
+            model = DriveModel.from_parameters(values, source)
+            _LAST.append((asked, LiveDiagnosis(
+                model, reference=read_reference(model, runs) if runs else None)))
+        live = _LAST[0][1]
+        _LAST[0] = asked, live.with_window(samples.recording(
+            'the last window', live.model.drives), int(samples.stamp[0]) / 1e9)
+    except PprsError as error:
+        if not _LAST:
+            return {'error': str(error)}
+        # What is known of this model remains, though this window says nothing.
+        failed = {'withdrawn': [], 'error': str(error)}
+    live = _LAST[0][1]
+    return {**live.to_dict(), ADOPTED: live.adopted(), **failed}

@@ -43,7 +43,7 @@ class PlatformMechanism(DriveModel):
             blocks |= dict.fromkeys(joints, block)
         effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
                                        ModelJointFriction(blocks))
-        robot = model.robot.as_mechanism(model.strokes, model.effort_limits)
+        robot = model.robot.as_mechanism(model.limits.strokes, model.limits.efforts)
         return cls(robot=robot, effects=effects, reversal=model.reversal, limits=model.limits,
                    values=values)
 

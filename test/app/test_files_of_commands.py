@@ -12,9 +12,7 @@ from pathlib import Path
 import pytest
 from made_up_recordings import judged, measured
 
-from pprs_dynamics.app.commands.arguments import (
-    number,
-)
+from pprs_dynamics.app.commands.arguments import number
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.measurement.files.recording import write_recording
 

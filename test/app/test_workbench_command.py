@@ -13,10 +13,7 @@ import pytest
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
-from pprs_dynamics.measurement.files.recording import (
-    read_recording,
-    write_bag,
-)
+from pprs_dynamics.measurement.files.recording import read_recording, write_bag
 
 
 @pytest.fixture(scope='module')

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {merged, rowsOf, Client, unpack} from '../../pprs_dynamics/app/browser/client.mjs';
+import {rowsOf, Client, unpack} from '../../pprs_dynamics/app/browser/client.mjs';
 
 const packed = (header, values = []) => {
   const text = new TextEncoder().encode(JSON.stringify(header).padEnd(
@@ -22,18 +22,6 @@ test('arrays are cut into rows', () => {
   assert.deepEqual(rowsOf(arrays.now).map((row) => [...row]), [[1, 2, 3], [4, 5, 6]]);
 });
 
-test('what changed takes the place of what was, effect by effect', () => {
-  const first = merged(null, {
-    revision: 1, effects: [{name: 'a', v: 1}, {name: 'b', v: 1}], effect_names: ['a', 'b']});
-  const second = merged(first, {revision: 2, effects: [{name: 'b', v: 2}]});
-  assert.deepEqual(second.effects, [{name: 'a', v: 1}, {name: 'b', v: 2}]);
-  assert.equal(second.revision, 2);
-  assert.deepEqual(first.effects[1], {name: 'b', v: 1});
-  const third = merged(second, {effect_names: ['b'], effects: []});
-  assert.deepEqual(third.effects, [{name: 'b', v: 2}]);
-  assert.deepEqual(merged(null, {is_empty: true}).effects, []);
-});
-
 const serve = (answers) => {
   const asked = [];
   globalThis.fetch = async (path, options) => {
@@ -49,14 +37,14 @@ const serve = (answers) => {
 test('changes go out one after the other, each with the revision before it', async () => {
   const told = [];
   const server = new Client(() => {}, (text) => told.push(text));
-  server.state = {revision: 1, version: 1};
+  server.state = {revision: 1, version: 1, drawn: 'a'};
   const asked = serve([
-    () => ({header: {revision: 2, version: 2}}),
-    () => ({header: {revision: 3, version: 3}})]);
+    () => ({header: {revision: 2, version: 2, drawn: 'b'}}),
+    () => ({header: {revision: 3, version: 3, drawn: 'c'}})]);
   server.change('tick', {effect: 'a'});
   await server.change('tick', {effect: 'b'});
-  assert.deepEqual(asked.map(([, body]) => [body.effect, body.revision, body.since]),
-                   [['a', 1, 1], ['b', 2, 2]]);
+  assert.deepEqual(asked.map(([, body]) => [body.effect, body.revision, body.drawn]),
+                   [['a', 1, 'a'], ['b', 2, 'b']]);
   assert.equal(server.state.revision, 3);
   assert.deepEqual(told, ['', '']);
 });
@@ -79,7 +67,7 @@ test('a refusal is told, and the screen asked for', async () => {
   await server.change('tick', {effect: 'a'});
   await new Promise((done) => { setTimeout(done, 10); });
   assert.deepEqual(told, ['something was changed elsewhere']);
-  assert.equal(asked[1][0], '/api/screen?since=1');
+  assert.equal(asked[1][0], '/api/screen?drawn=');
   assert.equal(server.state.revision, 5);
 });
 
@@ -90,5 +78,5 @@ test('a change that the answer to one of ours has already is not asked for', asy
   await server.hear(4);
   assert.deepEqual(asked, []);
   await server.hear(5);
-  assert.equal(asked[0][0], '/api/screen?since=4');
+  assert.equal(asked[0][0], '/api/screen?drawn=');
 });

@@ -105,17 +105,6 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
         assert 0 < std < abs(value)
 
 
-def test_a_step_taken_back_gives_the_old_file_to_the_byte(files: Files) -> None:
-    output = files.folder / 'back.yaml'
-    done = pprs('history', files.new, '--undo', '--output', output)
-    assert done.returncode == 0, done.stderr
-    assert DriveModel.load(output).values == DriveModel.load(files.model).values
-    changed = [line for line in output.read_text().splitlines()
-               if line not in files.model.read_text().splitlines()]
-    # Comments may keep the column that longer numbers moved them to.
-    assert all('#' in line for line in changed)
-
-
 def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
     return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1],
                  validation, diagnosis=files.diagnosis, **options)

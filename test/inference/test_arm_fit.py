@@ -106,26 +106,6 @@ def test_fitted_links_are_bodies(tmp_path: Path) -> None:
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
 
 
-def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
-    from pprs_dynamics import DriveModel
-    from pprs_dynamics.measurement.files.recording import Recording
-
-    given = DriveModel.load('config/single_axis.yaml')
-    open_values = {**given.values, 'tolerances.links.mass': 0.2, 'tolerances.friction.coulomb': 0.3}
-    real = DriveModel.from_parameters({
-        **given.values, 'links.mass': [100.0], 'friction.coulomb': [22.0]})
-    time = np.arange(0, 20, 0.002)
-    q = 0.05 * np.sin(2 * time)[:, None] + 0.01 * np.sin(9 * time)[:, None]
-    v = 0.1 * np.cos(2 * time)[:, None] + 0.09 * np.cos(9 * time)[:, None]
-    a = -0.2 * np.sin(2 * time)[:, None] - 0.81 * np.sin(9 * time)[:, None]
-    force = real.drive_forces(JointMotion(q, v, a, time)).total
-    force = force + 0.5 * np.random.default_rng(0).normal(size=force.shape)
-    run = Recording.from_arrays('run', time, q, None, force, ('axis',))
-    fit = fit_base(DriveModel.from_parameters(open_values), [run])
-    assert fit.model.values['links.mass'][0] == pytest.approx(100.0, rel=0.01)
-    assert fit.model.values['friction.coulomb'][0] == pytest.approx(22.0, rel=0.01)
-
-
 def write_currents(folder: Path, model: DriveModel, gain: tuple[float, ...], name: str) -> Path:
     """Write a packed CSV of currents, joints in another order, stamps that jitter."""
     run = arm.record(model, arm.motion(20.0), NOISE)

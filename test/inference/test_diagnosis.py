@@ -59,7 +59,7 @@ def test_columns_of_the_structure_are_what_the_model_with_the_effect_says(
             continue  # belongs to no angle
         # The step of the derivative itself: loads, which friction follows, are not linear.
         size = coefficient.scale
-        found = change(design, name, effect.at({coefficient.name: size}).to_file())
+        found = change(design, name, effect.at({coefficient.name: size}).values)
         column = np.stack([term.rows[d][k] for d in range(6)], axis=1) * size
         assert np.abs(column).max() > 0, 'a candidate that changes nothing'
         np.testing.assert_allclose(found, column, atol=1e-3 * np.abs(column).max())

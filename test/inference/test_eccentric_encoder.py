@@ -11,7 +11,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.measurement.files.recording import Recording
@@ -94,14 +93,3 @@ def test_what_it_is_taken_for_stays_what_it_is(arm, name, values):
     model = with_effect(arm, name, **values)
     found = diagnose(arm, [recorded(arm, model=model)])
     assert [one.name for one in found.effects] == [name]
-
-
-def test_a_slide_without_a_lead_and_a_3_pprs_do_not_have_it(arm):
-    design = Design.of(arm, [recorded(arm)])
-    assert [design.acts_on(EccentricEncoder, d) for d in range(3)] == [True, True, False]
-    with pytest.raises(ModelError, match='eccentric_encoder'):
-        DriveModel.from_parameters(
-            {**DriveModel.load().values, 'effects.active': ['eccentric_encoder'],
-                     'effects.eccentric_encoder.lift_1.amplitude': 1e-4,
-                     'effects.eccentric_encoder.lift_1.phase': 0.0,
-                     'effects.eccentric_encoder.lift_1.pitch': 0.005})

@@ -15,7 +15,6 @@ import pytest
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -59,19 +58,6 @@ def wound_up(model: DriveModel, compliance: float, loss: float = 0.0, second: bo
         'link_position': read(moved.position + 0.01)} if second else {})
 
 
-def with_elastic(model: DriveModel, compliance: float, loss: float) -> DriveModel:
-    found = DriveModel.from_parameters({**model.values, 'effects.active': ['elastic_joint'],
-                         'effects.elastic_joint.swing.compliance': compliance,
-                         'effects.elastic_joint.swing.loss': loss}, model.source)
-    return found
-
-
-def left(model: DriveModel, recording: Recording) -> float:
-    found = reconstruct(model, recording)
-    error = found.treat(found.effort) - treated_forces(model, found)['total']
-    return float(error[:, SWING].std())
-
-
 def test_a_second_encoder_says_where_the_link_is_and_what_it_carries() -> None:
     random = np.random.default_rng(1)
     load = 40 * random.normal(size=200)
@@ -95,18 +81,6 @@ def test_a_second_encoder_says_where_the_link_is_and_what_it_carries() -> None:
     heavier[0, 50, 1] += COMPLIANCE * 10
     q, _, _ = effect.windup_error(drives, transmitted, heavier)
     assert q[50, 1] == pytest.approx(COMPLIANCE * 10, rel=0.05)
-
-
-def test_a_model_with_the_joint_leaves_the_noise(tmp_path: Path) -> None:
-    model = made_up_arm.real_arm(tmp_path)
-    recording = wound_up(model, COMPLIANCE, LOSS)
-    noise = left(model, wound_up(model, 0.0))
-    before, after = left(model, recording), left(with_elastic(model, COMPLIANCE, LOSS), recording)
-    assert before > 5 * noise
-    assert after < 1.2 * noise
-    # The load alone tells less than the link's own encoder.
-    alone = wound_up(model, COMPLIANCE, LOSS, second=False)
-    assert after < left(with_elastic(model, COMPLIANCE, LOSS), alone) < before
 
 
 def test_an_elastic_joint_is_found_with_its_compliance(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component, E
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
@@ -200,3 +202,84 @@ def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prior_costs() -> N
         assert terms['drives'] == pytest.approx(
             2 * np.log(3) + 2 * np.log(3) if on_drives in candidates else 0)
         assert all(terms[name] == 0 for name in ('shapes', 'signs', 'feasibility'))
+
+
+# Queries of the table, against their definitions over all sets of up to two effects.
+
+Costs = dict[frozenset[str], float]  # of the cheapest admissible set, by names
+TWO = {('structure_4', None): 0.25, ('drive_1', 0): 0.35}
+
+
+def tabulated(number: int, barred: str = '') -> tuple[ModelTable, Costs]:
+    """Return a table in which sets with an effect are inadmissible, and its costs by names."""
+    fits = FittedSets(random_design(TWO, number), DECISIONS)
+    fits.form_errors = SimpleNamespace(  # type: ignore[assignment]
+        reason=lambda fitted: 'form' * (barred in {one.name for one in fitted.effects}))
+    costs: Costs = {}
+    for size in range(3):
+        for chosen in combinations(everything(), size):
+            names = frozenset(one.name for one in chosen)
+            if len(names) == size:
+                fitted = fits.evaluate(chosen)
+                if barred not in names:
+                    costs[names] = min(costs.get(names, np.inf), fitted.total)
+    return ModelTable(fits, fits), costs
+
+
+def named(table: ModelTable) -> frozenset[str]:
+    return frozenset(one.name for one in table.best.effects)
+
+
+@pytest.mark.parametrize('number', [0, 2, 3])
+def test_the_table_has_one_row_for_each_choice_of_effects(number: int) -> None:
+    table, costs = tabulated(number, 'structure_3')
+    assert [row.cost for row in table.rows] == sorted(costs.values())
+    assert {frozenset(row.placed_names): row.cost for row in table.rows} == costs
+    best = named(table)
+    assert best
+    for effect in table.best.effects:
+        without = min(cost for names, cost in costs.items() if effect.name not in names)
+        assert table.evidence(effect) == pytest.approx(without - costs[best])
+        assert effect.name not in table.without(effect).placed_names
+    assert {name: one.cost for name, one in table.alone.items()} == {
+        name: cost for names, cost in costs.items() if len(names) == 1 for name in names}
+
+
+@pytest.mark.parametrize('margin', [2.0, 10.0, 200.0])
+@pytest.mark.parametrize('number', range(3))
+def test_rivals_and_suspects_are_rows_within_a_margin(number: int, margin: float) -> None:
+    table, costs = tabulated(number)
+    best = named(table)
+    near = {names: cost - costs[best] for names, cost in costs.items()
+            if names != best and cost <= costs[best] + margin}
+    rivals = {frozenset(one.row.placed_names): (set(one.missing), set(one.instead))
+              for one in table.rivals(margin)}
+    assert rivals == {names: (set(best - names), set(names - best)) for names in near
+                      if best - names and names - best}
+    assert {one.name for one, _ in table.suspects(margin)} == {
+        name for names in near if best < names and len(names) == len(best) + 1
+        for name in names - best}
+
+
+@pytest.mark.parametrize('number', range(3))
+def test_inadmissible_sets_near_the_best_are_listed_and_never_rows(number: int) -> None:
+    barred, (strongest, _) = {}, TWO
+    table, costs = tabulated(number, strongest[0])
+    for fitted in table.first.sets:
+        if strongest[0] in {one.name for one in fitted.effects}:
+            barred[fitted] = fitted.total - min(costs.values())
+    for margin in (-20.0, 0.0, 10.0):
+        found = table.barred(margin)
+        assert set(found) == {fitted for fitted, above in barred.items() if above < margin}
+        assert [one.total for one in found] == sorted(one.total for one in found)
+    assert any(0 < above < 10 for above in barred.values())
+    assert not any(strongest[0] in row.placed_names for row in table.rows)
+
+
+def test_sets_with_a_nonlinear_effect_are_those_of_the_last_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(IN_STRUCTURE[2], 'nonlinear', True, raising=False)
+    first, last = (tabulated(number)[0].first for number in (0, 1))
+    for row in ModelTable(first, last).rows:
+        assert row.fits is (last if 'structure_2' in row.placed_names else first)

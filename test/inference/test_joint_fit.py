@@ -11,11 +11,7 @@ from scipy.linalg import block_diag
 
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
-from pprs_dynamics.inference.regression.normal_equations import (
-    BEYOND_TOLERANCE,
-    Block,
-    Prior,
-)
+from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE, Block, Prior
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 

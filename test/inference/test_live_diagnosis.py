@@ -15,10 +15,7 @@ from single_axis import AXIS
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.live_diagnosis import (
-    LiveDiagnosis,
-    change_point,
-)
+from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis, change_point
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 

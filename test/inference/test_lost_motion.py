@@ -17,7 +17,6 @@ from planar_arm import planar_arm
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -25,13 +24,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 SWING = 1  # the joint that carries weight
 TIME = np.arange(0, 12, 0.005)
 NOISE = 0.05  # [N m]
-
-
-def on_swing(**parameters: float) -> dict[str, object]:
-    """Return the block of a model file."""
-    every = {'backlash': 0.0, 'play': 0.0, **parameters}
-    return {'effects.active': ['lost_motion'],
-            **{f'effects.lost_motion.swing.{name}': value for name, value in every.items()}}
 
 
 def recorded(model: DriveModel, position: Array, effort: Array, time: Array) -> Recording:
@@ -88,22 +80,6 @@ def test_loads_choose_the_flank() -> None:
     load = np.array([[5.0, -30.0], [5.0, 10.0]])
     error = effect.loaded_position_error(('slide_1', 'lift_1'), load)
     np.testing.assert_allclose(error, [[0.0, -0.002], [0.0, 0.002]], rtol=1e-12)
-
-
-@pytest.mark.parametrize('size', [0.008, 0.03])
-def test_a_model_with_the_play_leaves_the_noise(tmp_path: Path, size: float) -> None:
-    model = made_up_arm.real_arm(tmp_path)
-    recording = with_play(model, size)
-
-    def left(one: object) -> float:
-        found = reconstruct(one, recording)
-        error = found.treat(found.effort) - treated_forces(one, found)['total']
-        return float(error[:, SWING].std())
-
-    before = left(model)
-    after = left(DriveModel.from_parameters({**model.values, **on_swing(play=size)}, model.source))
-    assert after < 0.5 * before
-    assert after < 6 * NOISE
 
 
 @pytest.mark.parametrize('size', [0.008, pytest.param(0.03, marks=pytest.mark.slow)])

@@ -10,9 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.residuals.measuring import (
-    measure_residuals,
-)
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -70,19 +68,3 @@ def test_noise_goes_on_through_the_gaps_of_a_recording() -> None:
     residuals, _ = measure_residuals(DriveModel.load(), [cut, recording])
     np.testing.assert_array_equal(np.unique(residuals.segment), [0, 1, 2])
     np.testing.assert_array_equal(residuals.record, np.maximum(residuals.segment - 1, 0))
-
-
-def test_the_variables_are_those_of_the_motion() -> None:
-    recording, _ = recorded(25, 0.0)
-    residuals, _ = measure_residuals(DriveModel.load(), [recording])
-    truth = DriveModel.load().mechanism(Excitation(DURATION, seed=25).motion(residuals.time))
-    motion = truth.motion
-    for name, expected, tolerance in (
-            ('position', truth.position, 1e-5), ('velocity', truth.velocity, 1e-4),
-            ('acceleration', truth.acceleration, 5e-3), ('load', truth.friction_load, 0.02),
-            ('rod_angle', np.tile(truth.links.chains.rod_angle, 2), 1e-4),
-            ('platform_x', motion.position[:, 0], 1e-5), ('platform_tilt', motion.tilt, 1e-3),
-            ('platform_turn', motion.turn, 1e-3)):
-        np.testing.assert_allclose(residuals.variables[name], expected, rtol=0, atol=tolerance,
-                                   err_msg=name)
-        assert np.ptp(expected) > 5 * tolerance

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_files import drawn
+from made_up_files import ARM, arm_efforts, drawn, motion
 
 from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.parameter_file import parse_parameters
 
 
 def outcome(folder: Path, seed: int) -> str:
@@ -38,6 +40,26 @@ def outcome(folder: Path, seed: int) -> str:
         return 'position'
     # Efforts of a file are right where their unit is.
     return 'right' if np.allclose(found.effort, effort, rtol=1e-3, atol=0.01) else 'effort'
+
+
+@pytest.mark.parametrize('names', ['position effort', 'effort'])
+def test_the_line_for_exchanged_drives_reads_them_rightly(names: str, tmp_path: Path) -> None:
+    time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
+    effort = arm_efforts(q, v, a) + np.random.default_rng(4).normal(0, 0.03, q.shape)
+    (tmp_path / 'robot.urdf').write_text(ARM)
+    columns = {f'{joint}/{quantity}': values[:, 1 - k if quantity in names else k]
+               for quantity, values in (('position', q), ('effort', effort))
+               for k, joint in enumerate(('shoulder', 'elbow'))}
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.column_stack([time, *columns.values()]), delimiter=',', comments='',
+               header=','.join(('time', *columns)))
+    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
+    line = first.questions[0].partition('write ')[2]
+    model = DriveModel.from_parameters(parse_parameters(
+        f'{first.text}    {line}\n', 'robot.yaml'), source=str(tmp_path / 'robot.yaml'))
+    found = read_recording(path, model.recorded)
+    np.testing.assert_allclose(found.position, q)
+    np.testing.assert_allclose(found.effort, effort)
 
 
 @pytest.mark.parametrize(('first', 'count'), [

@@ -11,25 +11,18 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from random_states import ELBOWS, paper_model, random_robot, smooth_motion
+from random_states import inverse_kinematics, paper_model
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.differentiation import (
-    SHORTEST_WINDOW,
-    LocalPolynomial,
-    Stretch,
-    choose_smoothing,
-)
+from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
 
 RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
 STEP = 1 / RATE
@@ -70,7 +63,7 @@ def truth_at(time, frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
     """Return what the paper's robot does and needs at times within 0..DURATION."""
     path = Excitation(DURATION + 1, seed, amplitude, tilt, frequency)
     motion = motion_from_poses(path, np.asarray(time) + 0.5)
-    return Truth(np.asarray(time), solve_inverse_kinematics(MODEL.robot.geometry, motion),
+    return Truth(np.asarray(time), inverse_kinematics(MODEL.robot.geometry, motion),
                  MODEL.drive_forces(motion).total)
 
 
@@ -106,34 +99,6 @@ def rms(values, axis=0):
 
 # Forward motion ------------------------------------------------------------------------------
 
-@pytest.mark.parametrize('elbow', ELBOWS)
-def test_platform_rates_are_differences_of_forward_kinematics(elbow):
-    geometry = random_robot(np.random.default_rng(3), elbow).geometry
-    home = solve_inverse_kinematics(
-        geometry, smooth_motion(np.array([0.3]), elbow)).position
-    rng, t = np.random.default_rng(4), np.linspace(0, 2, 40)
-    frequency, phase = rng.uniform(2, 5, 6), rng.uniform(0, 6, 6)
-    size = 0.01
-
-    def drives(time, derivative=0):
-        angle = frequency * time[:, None] + phase + derivative * np.pi / 2
-        return home * (derivative == 0) + size * frequency ** derivative * np.sin(angle)
-
-    class Path:
-
-        def motion(self, time):
-            q = drives(time)
-            return solve_forward_motion(geometry, q, 0 * q, 0 * q)
-
-    expected = motion_from_poses(Path(), t)
-    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2))
-    # Poses are known to 1e-13; over h^2 = 1e-6 that is 1e-7. Truncation: h^4 of 5 rad/s.
-    for name, tolerance in (('position', 1e-12), ('linear_velocity', 1e-9),
-                            ('angular_velocity', 1e-8), ('linear_acceleration', 1e-6),
-                            ('angular_acceleration', 1e-5)):
-        assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=tolerance)
-    assert np.abs(found.angular_velocity).max() > 0.1
-
 
 def test_drives_that_cannot_close_are_named_with_sample_and_time():
     real = truth()
@@ -157,26 +122,6 @@ def test_local_polynomials_are_exact_for_polynomials_of_their_order(window):
         expected = polynomial.deriv(derivative)(t)[inner] if derivative else polynomial(t)[inner]
         assert_allclose(found[derivative], np.stack((expected, 2 * expected), axis=1), rtol=0,
                         atol=tolerance * max(1.0, np.abs(expected).max()))
-
-
-@pytest.mark.parametrize(('motion', 'resolution'), [
-    (MOTIONS[0], 1e-5), (MOTIONS[1], 1e-6), (MOTIONS[2], 1e-6), (MOTIONS[3], 1e-7)])
-def test_window_from_the_data_is_nearly_the_best(motion, resolution):
-    real = truth(*motion).drives
-    q = np.round(real.position / resolution) * resolution
-    chosen = choose_smoothing([Stretch(q, STEP)])
-
-    def error(window):
-        filter_ = LocalPolynomial(window, STEP)
-        inner = slice(filter_.half, -filter_.half)
-        return rms(filter_.filtered(q, 2) - real.acceleration[inner], axis=None)
-
-    found = error(chosen.polynomial(STEP).window)
-    best = min(error(window) for window in range(SHORTEST_WINDOW, 400, 12))
-    assert found < 1.25 * best
-    # What it says to remain is what remains, but for quantisation that is no white noise.
-    assert rms(chosen.acceleration_error, axis=None) == pytest.approx(found, rel=0.5)
-    assert f'{chosen.polynomial(STEP).window} samples' in chosen.text
 
 
 # The figure that counts ----------------------------------------------------------------------

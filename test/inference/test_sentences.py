@@ -27,9 +27,7 @@ from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
-from pprs_dynamics.inference.diagnosis.quantities import (
-    with_uncertainty,
-)
+from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_up_recordings import DYNAMIC, STATE, STORE, message, with_definitions, write_plain_bag
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
@@ -27,16 +28,7 @@ EPOCH = 1_700_000_000
 TIME = np.arange(N) * 0.01
 POSITION = np.sin(TIME[:, None] * [1.0, 1.3])
 EFFORT = 2.0 * np.cos(TIME[:, None] * [1.0, 1.3])
-STATE, ARRAY = 'sensor_msgs/msg/JointState', 'std_msgs/msg/Float64MultiArray'
-DYNAMIC = 'control_msgs/msg/DynamicJointState'
-DYNAMIC_TEXT = '''std_msgs/Header header
-string[] joint_names
-control_msgs/InterfaceValue[] interface_values
-================================================================================
-MSG: control_msgs/InterfaceValue
-string[] interface_names
-float64[] values
-'''
+ARRAY = 'std_msgs/msg/Float64MultiArray'
 
 
 def stamp(k: int) -> int:
@@ -55,63 +47,49 @@ def assert_read(recording: Recording, scale: float = 1.0) -> None:
     np.testing.assert_allclose(recording.effort, scale * EFFORT, rtol=1e-12)
 
 
-def store(kind: Stores = Stores.ROS2_KILTED) -> Any:
-    types = get_typestore(kind)
-    found = get_types_from_msg(DYNAMIC_TEXT, DYNAMIC)
-    types.register({name: fields for name, fields in found.items() if name not in types.types})
-    return types
-
-
-def header(types: Any, k: int, *first: int) -> Any:
+def header(k: int, types: Any = STORE, *first: int) -> Any:
     time = types.types['builtin_interfaces/msg/Time'](*divmod(stamp(k), 10**9))
     return types.types['std_msgs/msg/Header'](*first, time, '')
 
 
-def state(types: Any, k: int, *first: int) -> Any:
-    return types.types[STATE](header(types, k, *first), list(JOINTS), POSITION[k], np.zeros(0),
+def state(k: int, types: Any = STORE, *first: int) -> Any:
+    return types.types[STATE](header(k, types, *first), list(JOINTS), POSITION[k], np.zeros(0),
                               EFFORT[k])
 
 
-def array(types: Any, values: np.ndarray) -> Any:
-    layout = types.types['std_msgs/msg/MultiArrayLayout']([], 0)
-    return types.types[ARRAY](layout, values)
+def currents(k: int, interface: str, types: Any = STORE, *first: int) -> Any:
+    value = types.types['control_msgs/msg/InterfaceValue']
+    return types.types[DYNAMIC](header(k, types, *first), list(JOINTS), [
+        value([interface, 'position'], np.array([EFFORT[k, j], POSITION[k, j]]))
+        for j in range(2)])
+
+
+def array(values: np.ndarray) -> Any:
+    layout = STORE.types['std_msgs/msg/MultiArrayLayout']([], 0)
+    return STORE.types[ARRAY](layout, values)
 
 
 def ros1(path: Path, part: slice = slice(None), dynamic: bool = False) -> Path:
-    types = store(Stores.ROS1_NOETIC)
+    types = with_definitions(get_typestore(Stores.ROS1_NOETIC))
     with Writer1(path) as writer:
         kind = DYNAMIC if dynamic else STATE
         connection = writer.add_connection('/joint_states', kind, typestore=types)
         for k in range(N)[part]:
-            message = currents(types, k, 'effort', k) if dynamic else state(types, k, k)
+            message = currents(k, 'effort', types, k) if dynamic else state(k, types, k)
             writer.write(connection, stamp(k), types.serialize_ros1(message, kind))
     return path
 
 
-def ros2(path: Path, messages: Callable[[Any, int], dict[str, tuple[str, Any]]],
-         pack: Callable[[Writer], None] = lambda writer: None, part: slice = slice(None)) -> Path:
-    types = store()
-    writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-    pack(writer)
-    with writer:
-        connections: dict[str, Any] = {}
-        for k in range(N)[part]:
-            for topic, (kind, message) in messages(types, k).items():
-                if topic not in connections:
-                    connections[topic] = writer.add_connection(topic, kind, typestore=types)
-                writer.write(connections[topic], stamp(k), types.serialize_cdr(message, kind))
-    return path
+def ros2(path: Path, messages: Callable[[int], dict[str, Any]],
+         pack: Callable[[Writer], None] = lambda writer: None) -> Path:
+    """Write a bag of what a function returns for each sample, by topic."""
+    every = [messages(k) for k in range(N)]
+    return write_plain_bag(path, {topic: [one[topic] for one in every] for topic in every[0]},
+                           received=stamp, pack=pack)
 
 
-def states(types: Any, k: int) -> dict[str, tuple[str, Any]]:
-    return {'/joint_states': (STATE, state(types, k))}
-
-
-def currents(types: Any, k: int, interface: str, *first: int) -> Any:
-    value = types.types['control_msgs/msg/InterfaceValue']
-    return types.types[DYNAMIC](header(types, k, *first), list(JOINTS), [
-        value([interface, 'position'], np.array([EFFORT[k, j], POSITION[k, j]]))
-        for j in range(2)])
+def states(k: int) -> dict[str, Any]:
+    return {'/joint_states': state(k)}
 
 
 def test_a_bag_of_ros_1_is_read(tmp_path: Path) -> None:
@@ -149,15 +127,14 @@ def test_a_packed_storage_file_alone_is_read(tmp_path: Path) -> None:
 def test_currents_of_hardware_interfaces_become_efforts(
     interface: str, scale: float, tmp_path: Path,
 ) -> None:
-    path = ros2(tmp_path / 'bag', lambda types, k: {
-        '/dynamic_joint_states': (DYNAMIC, currents(types, k, interface))})
+    path = ros2(tmp_path / 'bag', lambda k: {
+        '/dynamic_joint_states': currents(k, interface)})
     assert_read(read(path), scale)
 
 
 def test_fields_of_any_message_are_columns(tmp_path: Path) -> None:
-    path = ros2(tmp_path / 'bag', lambda types, k: {
-        '/positions': (ARRAY, array(types, POSITION[k])),
-        '/torques': (ARRAY, array(types, np.array([7.0, *EFFORT[k]])))})
+    path = ros2(tmp_path / 'bag', lambda k: {
+        '/positions': array(POSITION[k]), '/torques': array(np.array([7.0, *EFFORT[k]]))})
     keys = {f'{joint}.{quantity}': name for j, joint in enumerate(JOINTS) for quantity, name in (
         ('position', f'/positions[{j}]'), ('effort', f'/torques.data[{j + 1}]'))}
     assert_read(read(path, keys))
@@ -168,10 +145,9 @@ def test_fields_of_any_message_are_columns(tmp_path: Path) -> None:
 
 
 def test_efforts_of_another_message_join_the_joint_states(tmp_path: Path) -> None:
-    def both(types: Any, k: int) -> dict[str, tuple[str, Any]]:
-        empty = types.types[STATE](header(types, k), list(JOINTS), POSITION[k], np.zeros(0),
-                                   np.zeros(0))
-        return {'/joint_states': (STATE, empty), '/torques': (ARRAY, array(types, EFFORT[k]))}
+    def both(k: int) -> dict[str, Any]:
+        return {'/joint_states': message(stamp(k), JOINTS, POSITION[k]),
+                '/torques': array(EFFORT[k])}
 
     path = ros2(tmp_path / 'bag', both)
     recording = read(path, {f'{joint}.effort': f'/torques[{j}]' for j, joint in enumerate(JOINTS)})
@@ -187,14 +163,11 @@ def test_positions_are_those_of_the_chosen_topic_whatever_else_is_in_the_bag(
     has_velocity, has_effort = random.random(2) < 0.5
     name = str(random.choice(['/joint_commands', '/a_first', '/robot/torque_states']))
 
-    def two(types: Any, k: int) -> dict[str, tuple[str, Any]]:
-        measured = state(types, k)
-        measured.effort = np.zeros(0) if has_effort else EFFORT[k]
-        time = types.types['builtin_interfaces/msg/Time'](*divmod(stamp(k) + late, 10**9))
-        other = types.types[STATE](
-            types.types['std_msgs/msg/Header'](time, ''), list(JOINTS),
-            offset * POSITION[k] + offset, np.ones(2) if has_velocity else np.zeros(0), EFFORT[k])
-        return {name: (STATE, other), '/joint_states': (STATE, measured)}
+    def two(k: int) -> dict[str, Any]:
+        other = message(stamp(k) + late, JOINTS, offset * POSITION[k] + offset,
+                        np.ones(2) if has_velocity else (), EFFORT[k])
+        return {name: other, '/joint_states': message(
+            stamp(k), JOINTS, POSITION[k], (), () if has_effort else EFFORT[k])}
 
     recording = read(ros2(tmp_path / 'bag', two))
     stamps = np.rint(recording.time * 1e9).astype(int) + (recording.epoch - EPOCH) * 10**9
@@ -207,11 +180,9 @@ def test_positions_are_those_of_the_chosen_topic_whatever_else_is_in_the_bag(
 
 
 def test_efforts_on_two_other_topics_are_a_question(tmp_path: Path) -> None:
-    def three(types: Any, k: int) -> dict[str, tuple[str, Any]]:
-        measured = state(types, k)
-        measured.effort = np.zeros(0)
-        return {'/joint_states': (STATE, measured), '/asked': (STATE, state(types, k)),
-                '/felt': (STATE, state(types, k))}
+    def three(k: int) -> dict[str, Any]:
+        return {'/joint_states': message(stamp(k), JOINTS, POSITION[k]), '/asked': state(k),
+                '/felt': state(k)}
 
     with pytest.raises(UnreadableFileError, match='/asked, /felt each have the effort of a'):
         read(ros2(tmp_path / 'bag', three))

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from made_up_recordings import STORE, header, message, states_of, write_plain_bag
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.inference.readings.columns import guess_columns
@@ -86,42 +85,19 @@ def test_dropped_samples_take_their_temperature_with_them():
     np.testing.assert_array_equal(recording.channels['temperature'][:, 0], np.delete(WARM, 3))
 
 
-def bag(path: Path, topic: str, kind: str, messages: list[tuple[float, dict[str, Any]]]) -> Path:
-    """Write joint states, and messages of another type with their times."""
-    write_recording(path / 'states.mcap',
-                    Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS))
-    store = get_typestore(Stores.ROS2_KILTED)
-
-    def header(time: float, frame: str = '') -> Any:
-        stamp = store.types['builtin_interfaces/msg/Time'](*divmod(round(time * 1e9), 10**9))
-        return store.types['std_msgs/msg/Header'](stamp=stamp, frame_id=frame)
-
-    with Writer(path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        joints = writer.add_connection('/joint_states', 'sensor_msgs/msg/JointState',
-                                       typestore=store)
-        for time, q, tau in zip(TIME, POSITION, EFFORT, strict=True):
-            message = store.types['sensor_msgs/msg/JointState'](
-                header=header(time), name=list(JOINTS), position=q, velocity=np.zeros(0),
-                effort=tau)
-            writer.write(joints, round(time * 1e9), store.serialize_cdr(
-                message, 'sensor_msgs/msg/JointState'))
-        others = writer.add_connection(topic, kind, typestore=store)
-        for time, fields in messages:
-            if 'frame' in fields:
-                fields = {**fields, 'header': header(time, fields['frame'])}
-                del fields['frame']
-            writer.write(others, round(time * 1e9), store.serialize_cdr(
-                store.types[kind](**fields), kind))
-    return path / 'bag'
+def bag(path: Path, topic: str, messages: list[Any]) -> Path:
+    """Write joint states, and messages on another topic."""
+    return write_plain_bag(path / 'bag', {'/joint_states': states_of(
+        {'time': TIME, 'position': POSITION, 'velocity': None, 'effort': EFFORT}, JOINTS),
+        topic: messages})
 
 
 @pytest.mark.parametrize(('topic', 'frame', 'drives'), [
     ('/drives/j2/temperature', '', (1,)), ('/motor_temperature', 'j2', (1,)),
     ('/j2_temperature', '', (1,)), ('/gearbox/temperature', 'base', (0, 1))])
 def test_a_thermometer_belongs_to_the_drive_that_it_names(tmp_path, topic, frame, drives):
-    messages = [(t, {'frame': frame, 'temperature': 40 + t, 'variance': 0.0})
-                for t in (0.0, 0.5, 1.0)]
-    found = read(bag(tmp_path, topic, 'sensor_msgs/msg/Temperature', messages))
+    found = read(bag(tmp_path, topic, [STORE.types['sensor_msgs/msg/Temperature'](
+        header(round(t * 1e9), frame), 40 + t, 0.0) for t in (0.0, 0.5, 1.0)]))
     temperature = found.channels['temperature']
     for d in (0, 1):
         known = np.flatnonzero(np.isfinite(temperature[:, d]))
@@ -131,9 +107,8 @@ def test_a_thermometer_belongs_to_the_drive_that_it_names(tmp_path, topic, frame
 
 
 def test_joint_states_on_a_topic_of_temperatures(tmp_path):
-    messages = [(t, {'frame': '', 'name': ['j2', 'j1'], 'position': np.array([50 + t, 20.0]),
-                     'velocity': np.zeros(0), 'effort': np.zeros(0)}) for t in (0.2, 0.4)]
-    found = read(bag(tmp_path, '/joint_temperatures', 'sensor_msgs/msg/JointState', messages))
+    found = read(bag(tmp_path, '/joint_temperatures', [
+        message(round(t * 1e9), ['j2', 'j1'], [50 + t, 20.0]) for t in (0.2, 0.4)]))
     np.testing.assert_allclose(found.channels['temperature'][[20, 40]], [[20, 50.2], [20, 50.4]])
     np.testing.assert_allclose(found.effort, EFFORT)
 

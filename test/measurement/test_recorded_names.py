@@ -11,35 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from made_up_recordings import CONTROLLER, STORE, header, message, write_plain_bag
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.measurement.files.merged_states import CONTROLLER, JOINT_STATE
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 
 RATE, EPOCH = 100, 1_700_000_000
-POINT = """float64[] positions
-float64[] velocities
-float64[] accelerations
-float64[] effort
-builtin_interfaces/Duration time_from_start
-"""
-BREAK = '=' * 80 + '\n'
-# The interface definitions as a bag carries them.
-DEFINITIONS = {
-    CONTROLLER: f"""std_msgs/Header header
-string[] joint_names
-trajectory_msgs/JointTrajectoryPoint reference
-trajectory_msgs/JointTrajectoryPoint feedback
-trajectory_msgs/JointTrajectoryPoint error
-trajectory_msgs/JointTrajectoryPoint output
-{BREAK}MSG: trajectory_msgs/JointTrajectoryPoint
-{POINT}"""}
 
 
 @pytest.fixture(scope='module')
@@ -55,65 +36,37 @@ def with_keys(**keys: Any) -> DriveModel:
     return DriveModel.from_parameters({**DriveModel.load().values, **keys})
 
 
-class Bag:
-    """A bag, written message by message."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.store = path, get_typestore(Stores.ROS2_KILTED)
-        for name, text in DEFINITIONS.items():
-            self.store.register({key: fields for key, fields in get_types_from_msg(
-                text, name).items() if key not in self.store.types})
-        self.writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-        self.writer.open()
-        self.topics: dict[str, Any] = {}
-
-    def type(self, name: str) -> Any:
-        return self.store.types[name]
-
-    def header(self, time: float) -> Any:
-        stamp = round(time * 1e9)
-        return self.type('std_msgs/msg/Header')(
-            self.type('builtin_interfaces/msg/Time')(EPOCH + stamp // 10**9, stamp % 10**9), '')
-
-    def write(self, topic: str, kind: str, time: float, message: Any) -> None:
-        if topic not in self.topics:
-            self.topics[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
-        self.writer.write(self.topics[topic], EPOCH * 10**9 + round(time * 1e9),
-                          self.store.serialize_cdr(message, kind))
-
-    def state(self, topic: str, time: float, names: tuple[str, ...], position: Any = (),
-              effort: Any = ()) -> None:
-        numbers = (np.array(values, dtype=float) for values in (position, (), effort))
-        self.write(topic, JOINT_STATE, time, self.type(JOINT_STATE)(
-            self.header(time), list(names), *numbers))
-
-    def point(self, position: Any = (), effort: Any = ()) -> Any:
-        numbers = (np.array(values, dtype=float) for values in (position, (), (), effort))
-        return self.type('trajectory_msgs/msg/JointTrajectoryPoint')(
-            *numbers, self.type('builtin_interfaces/msg/Duration')(0, 0))
+def point(position: Any = (), effort: Any = ()) -> Any:
+    numbers = (np.array(values, dtype=float) for values in (position, (), (), effort))
+    return STORE.types['trajectory_msgs/msg/JointTrajectoryPoint'](
+        *numbers, STORE.types['builtin_interfaces/msg/Duration'](0, 0))
 
 
-def spread(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
-    for part in (slice(0, 3), slice(3, 6)):
-        bag.state('/joint_states', time, DRIVES[part], q[part], tau[part])
+def spread(stamp: int, q: np.ndarray, tau: np.ndarray) -> dict[str, list[Any]]:
+    return {'/joint_states': [message(stamp, DRIVES[part], q[part], (), tau[part])
+                              for part in (slice(0, 3), slice(3, 6))]}
 
 
-def controller(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
-    bag.write('/arm_controller/controller_state', CONTROLLER, time, bag.type(CONTROLLER)(
-        bag.header(time), list(DRIVES), bag.point(), bag.point(q), bag.point(),
-        bag.point((), tau)))
+def controller(stamp: int, q: np.ndarray, tau: np.ndarray) -> dict[str, list[Any]]:
+    return {'/arm_controller/controller_state': [STORE.types[CONTROLLER](
+        header(stamp), list(DRIVES), point(), point(q), point(), point((), tau))]}
+
+
+def written(path: Path, run: Any, write: Callable[..., dict[str, list[Any]]]) -> Path:
+    """Write a bag of what a function returns for the stamp and values of each sample."""
+    topics: dict[str, list[Any]] = {}
+    for time, q, tau in zip(*run, strict=True):
+        for topic, messages in write(EPOCH * 10**9 + round(time * 1e9), q, tau).items():
+            topics.setdefault(topic, []).extend(messages)
+    return write_plain_bag(path, topics)
 
 
 @pytest.mark.parametrize('write', [spread, controller])
 def test_states_of_other_messages_are_read(
-    run: Any, tmp_path: Path, write: Callable[..., None],
+    run: Any, tmp_path: Path, write: Callable[..., dict[str, list[Any]]],
 ) -> None:
     time, position, effort = run
-    bag = Bag(tmp_path / 'bag')
-    for k, moment in enumerate(time):
-        write(bag, float(moment), position[k], effort[k])
-    bag.writer.close()
-    recording = read_recording(bag.path, DriveModel.load().recorded)
+    recording = read_recording(written(tmp_path / 'bag', run, write), DriveModel.load().recorded)
     np.testing.assert_allclose(recording.position, position, atol=1e-12)
     np.testing.assert_allclose(recording.effort, effort, atol=1e-12)
     np.testing.assert_allclose(recording.time - recording.time[0], time, atol=1e-9)
@@ -123,33 +76,30 @@ def test_states_of_other_messages_are_read(
 
 
 def test_a_slower_message_lies_between_its_neighbours(run: Any, tmp_path: Path) -> None:
-    time, position, effort = run
-    bag = Bag(tmp_path / 'bag')
-    for k, moment in enumerate(time):
-        bag.state('/joint_states', float(moment), DRIVES[:3], position[k, :3], effort[k, :3])
-        if k % 2 == 0:
-            bag.state('/joint_states', float(moment), DRIVES[3:], position[k, 3:], effort[k, 3:])
-    bag.writer.close()
-    recording = read_recording(bag.path, DriveModel.load().recorded)
+    _, position, _ = run
+    later = iter(range(len(position)))
+
+    def seldom(*sample: Any) -> dict[str, list[Any]]:
+        both = spread(*sample)['/joint_states']
+        return {'/joint_states': both if next(later) % 2 == 0 else both[:1]}
+
+    recording = read_recording(written(tmp_path / 'bag', run, seldom), DriveModel.load().recorded)
     between = (position[:-2:2, 3:] + position[2::2, 3:]) / 2
     np.testing.assert_allclose(recording.position[1:len(between) * 2:2, 3:], between, atol=1e-9)
 
 
 def test_joints_have_the_names_of_the_machine(run: Any, tmp_path: Path) -> None:
-    time, position, effort = run
     model = with_keys(joint_prefix='left_', **{'joint_map.slide_1': 'x_axis'})
     names = joint_names(model.values, DRIVES)
     assert names == ('x_axis', 'left_slide_2', 'left_slide_3', 'left_lift_1', 'left_lift_2',
                      'left_lift_3')
-    bag = Bag(tmp_path / 'bag')
-    for k, moment in enumerate(time):
-        bag.state('/joint_states', float(moment), names, position[k], effort[k])
-    bag.writer.close()
-    recording = read_recording(bag.path, model.recorded)
+    bag = written(tmp_path / 'bag', run, lambda stamp, q, tau: {
+        '/joint_states': [message(stamp, names, q, (), tau)]})
+    recording = read_recording(bag, model.recorded)
     assert recording.drives == DRIVES
-    np.testing.assert_array_equal(recording.effort, effort)
+    np.testing.assert_array_equal(recording.effort, run[2])
     with pytest.raises(UnreadableFileError, match='slide_1'):
-        read_recording(bag.path, DriveModel.load().recorded)
+        read_recording(bag, DriveModel.load().recorded)
 
 
 COLUMNS = {'columns.time': 't', **{

@@ -31,7 +31,7 @@ from made_up_recordings import (
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.defects import Judgement
-from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.samples import Samples
 
 
@@ -172,17 +172,22 @@ def test_a_position_that_jumps_splits() -> None:
 
 
 @pytest.mark.parametrize('factor', [0.5, 5])
-def test_a_rate_that_changes_splits_where_it_changes(factor: float) -> None:
+def test_a_rate_that_changes_is_one_motion_with_irregular_steps(factor: float) -> None:
     arrays = measured()
     steps = np.full(1000, STEP)
     steps[450:] *= factor
     arrays['time'] = np.cumsum(steps)
     recording = judged(arrays)
-    finding = the(recording, 'changing_rate')
-    assert finding.spans == ((arrays['time'][449], arrays['time'][449]),)
-    assert f'from 500 Hz to {500 / factor:.4g} Hz' in finding.text
-    assert recording.segments == (slice(0, 449), slice(449, 1000))
-    assert [round(part.rate) for part in describe(recording).segments] == [500, 500 / factor]
+    the(recording, 'irregular_steps')
+    assert recording.segments == (slice(0, 1000),)
+
+
+def test_no_sample_of_an_irregular_clock_is_called_lost() -> None:
+    arrays = measured()
+    arrays['time'] = np.cumsum(np.random.default_rng(0).lognormal(np.log(STEP), 0.5, 1000))
+    recording = judged(arrays)
+    the(recording, 'irregular_steps')
+    assert recording.segments == (slice(0, 1000),)
 
 
 def test_gaps_split_and_lost_samples_do_not() -> None:

@@ -42,9 +42,7 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.joint_state_cdr import (
-    JointStateBlocks,
-)
+from pprs_dynamics.measurement.files.joint_state_cdr import JointStateBlocks
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,

@@ -91,6 +91,6 @@ def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
     assert not offered & {'knee.viscous', 'ankle.torque'}
     assert 'rear.viscous' in offered  # loops are not looked at
     motion = JointMotion(*np.random.default_rng(1).uniform(-0.5, 0.5, (3, 20, 2)))
-    knee = JointFrictionEffect.bound(parallelogram.robot).from_file({'knee': {'viscous': 0.3}})
+    knee = JointFrictionEffect.bound(parallelogram.robot).from_file({'knee.viscous': 0.3})
     forces = knee.force(parallelogram.mechanism(motion))
     assert forces[:, 0] == pytest.approx(0.3 * motion.velocity[:, 0], abs=1e-9)

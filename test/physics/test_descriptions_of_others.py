@@ -176,14 +176,6 @@ def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
     assert (structure.effort[0], structure.speed[0]) == (39, 2)
 
 
-@pytest.mark.parametrize('mass', ['-1'])
-def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None:
-    with pytest.raises(PprsError, match='link l1: its mass is '):
-        load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1')
-             + link('l1').replace('mass value="1.0"', f'mass value="{mass}"'),
-             'robot: {base: base, tool: l1, drives: [j1]}')
-
-
 THREE = (f'<worldbody><body name="t0"><joint name="a" axis="0 1 0"/>{BODY}'
          f'<body name="t" pos="0.3 0 0"><joint name="b" axis="0 0 1"/>{BODY}'
          f'<body name="u" pos="0.3 0 0"><joint name="c" axis="0 0 1"/>{BODY}</body></body></body>'

@@ -14,6 +14,7 @@ from oracles.first_principles import chain_vectors, closure
 from random_states import (
     ELBOWS,
     home_position,
+    inverse_kinematics,
     paper_geometry,
     paper_model,
     random_motion,
@@ -32,13 +33,7 @@ from pprs_dynamics.errors import (
     SingularityError,
     WorkspaceError,
 )
-from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
-    solve_inverse_kinematics,
-)
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number
-from pprs_dynamics.physics.three_pprs.robot import ThreePprs
+from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
@@ -60,7 +55,7 @@ def home_pose():
 
 def forward(geometry, q):
     """Return poses of drive positions."""
-    return solve_forward_motion(geometry, q, np.zeros_like(q), np.zeros_like(q))
+    return replace(paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
 
 
 def rotation_vector(motion):
@@ -70,8 +65,9 @@ def rotation_vector(motion):
 
 def solve(geometry, motion):
     """Return chains and [B] of a motion."""
-    state = ThreePprs(geometry, paper_model().robot.masses).state(motion, Reversal())
-    return state.links.chains, np.linalg.inv(state.links.inverse_table.reshape(-1, 6, 6))
+    found = inverse_kinematics(geometry, motion)
+    A = np.concatenate((np.ones_like(found.sin_u), found.sin_u), axis=1)
+    return found, A[:, :, None] * np.linalg.inv(found.J)
 
 
 def home_determinant(geometry):
@@ -83,7 +79,7 @@ def home_determinant(geometry):
 
 def test_inverse_kinematics_satisfies_the_closure_equations(geometry):
     motion = random_motion(np.random.default_rng(1), 200, geometry.elbow)
-    q = solve_inverse_kinematics(geometry, motion).position
+    q = inverse_kinematics(geometry, motion).position
     for sample in range(len(motion)):
         gap = closure(geometry, q[sample], motion.position[sample],
                       rotation_vector(motion[sample]))
@@ -97,7 +93,7 @@ def test_forward_kinematics_undoes_inverse_kinematics(elbow, robot):
                 else random_robot(np.random.default_rng(3), elbow).geometry)
     position, orientation = random_poses(np.random.default_rng(4), POSES, elbow)
     poses = PlatformMotion.at_rest(position, orientation)
-    found = forward(geometry, solve_inverse_kinematics(geometry, poses).position)
+    found = forward(geometry, inverse_kinematics(geometry, poses).position)
     assert_allclose(found.position, position, rtol=0, atol=POSE_TOLERANCE)
     assert_allclose(found.rotation, poses.rotation, rtol=0, atol=POSE_TOLERANCE)
 
@@ -118,7 +114,7 @@ def test_other_solutions_of_random_poses_are_refused():
     rng = np.random.default_rng(8)
     position, orientation = random_poses(rng, 20)
     true = PlatformMotion.at_rest(position, orientation)
-    q = solve_inverse_kinematics(geometry, true).position
+    q = inverse_kinematics(geometry, true).position
     sign_at_home = np.sign(home_determinant(geometry))
     others = 0
     for sample in range(len(q)):
@@ -140,7 +136,7 @@ def test_other_solutions_of_random_poses_are_refused():
 
 
 def test_drives_that_cannot_close_the_mechanism_raise(geometry):
-    q = solve_inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
+    q = inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
     q[1, 0] += 1.0  # one slide a metre away from the others
     with pytest.raises(ConvergenceError, match='sample 1') as caught:
         forward(geometry, q)
@@ -152,7 +148,7 @@ def test_drives_that_cannot_close_the_mechanism_raise(geometry):
     ids=['five', 'none', 'nan', 'ragged', 'words'])
 def test_drive_positions_that_are_none_raise(q):
     with pytest.raises(MotionError, match='drive positions'):
-        solve_forward_motion(paper_geometry(), q, np.zeros((1, 6)), np.zeros((1, 6)))
+        paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
 
 
 def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():
@@ -160,7 +156,7 @@ def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():
     quarter = tuple(np.asarray(paper_geometry().platform_angles) + np.pi / 2)
     geometry = replace(paper_geometry(), platform_angles=quarter)
     poses = PlatformMotion.at_rest(*random_poses(np.random.default_rng(10), 1))
-    q = solve_inverse_kinematics(geometry, poses).position
+    q = inverse_kinematics(geometry, poses).position
     with pytest.raises(PprsError, match='home'):
         forward(geometry, q)
 
@@ -183,7 +179,7 @@ def yaw_with_share(geometry, share):
 def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
     geometry = paper_geometry(elbow)
     pose = yaw_with_share(geometry, share)
-    q = solve_inverse_kinematics(geometry, pose).position
+    q = inverse_kinematics(geometry, pose).position
     found = forward(geometry, q)
     assert_allclose(found.position, pose.position, rtol=0, atol=1e-9)
 
@@ -192,8 +188,8 @@ def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
 
 def test_velocities_and_accelerations_are_derivatives_of_positions(geometry):
     t, h = np.linspace(0, 6, 200), 1e-3
-    middle = solve_inverse_kinematics(geometry, smooth_motion(t, geometry.elbow))
-    around = {k: solve_inverse_kinematics(geometry, smooth_motion(t + k * h, geometry.elbow))
+    middle = inverse_kinematics(geometry, smooth_motion(t, geometry.elbow))
+    around = {k: inverse_kinematics(geometry, smooth_motion(t + k * h, geometry.elbow))
               for k in (-2, -1, 1, 2)}
 
     def first(name):
@@ -237,8 +233,8 @@ def test_horizontal_rod_raises_singularity(elbow, chain):
     with pytest.raises(SingularityError, match=rf'chain {chain}\b') as caught:
         model.drive_forces(motion)
     assert '0.05' in str(caught.value)  # limits.rod_sine
-    assert_allclose(np.abs(solve_inverse_kinematics(
-        model.robot.geometry, motion, 1e-9).sin_u[0, chain - 1]), 0, atol=2e-3)
+    assert_allclose(np.abs(inverse_kinematics(
+        model.robot.geometry, motion).sin_u[0, chain - 1]), 0, atol=2e-3)
 
 
 @every_elbow

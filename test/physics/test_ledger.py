@@ -24,10 +24,7 @@ from pprs_dynamics.physics.model.ledger import (
     without_last_step,
 )
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.physics.model.parameter_file import (
-    default_parameters,
-    read_parameters,
-)
+from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
 STEP = Step(
     effect='coulomb_friction', error_before=0.2, error_after=0.1, held_out_before=0.21,

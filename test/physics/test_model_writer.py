@@ -21,11 +21,7 @@ from rclpy.node import Node
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.model_writer import edit_model, write_model
-from pprs_dynamics.physics.model.parameter_file import (
-    LEDGER,
-    default_parameters,
-    read_parameters,
-)
+from pprs_dynamics.physics.model.parameter_file import LEDGER, default_parameters, read_parameters
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 # Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.

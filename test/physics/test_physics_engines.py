@@ -12,9 +12,7 @@ from numpy.testing import assert_allclose
 # Only a missing library skips these tests; a broken oracle must fail.
 from oracles.mujoco_robot import MujocoRobot
 from oracles.pinocchio_robot import PinocchioRobot
-from random_states import ELBOWS, model_of, paper_model, random_motion, random_robot
-
-from pprs_dynamics import PlatformMotion
+from random_states import ELBOWS, model_of, random_motion, random_robot
 
 ENGINES = {'mujoco': MujocoRobot, 'pinocchio': PinocchioRobot}
 STATES = 1000
@@ -53,7 +51,7 @@ def answers(states):
 
 @every_engine
 def test_drive_motion_is_the_engines(states, answers, engine):
-    chains, oracle = states[2].mechanism.links.chains, answers[engine]
+    chains, oracle = states[2].mechanism.links, answers[engine]
     # Accelerations up to some 100 m/s^2 come from divisions by sin u.
     assert_allclose(chains.position, oracle.position, rtol=0, atol=1e-14)
     assert_allclose(chains.velocity, oracle.velocity, rtol=0, atol=1e-13)
@@ -112,34 +110,3 @@ def test_printed_equation_12_contradicts_the_engines_but_has_their_power(elbow):
     assert np.abs(printed - oracle).max() > 0.1
     assert_allclose(np.sum(q_dot * printed, axis=1), np.sum(q_dot * oracle, axis=1), rtol=0,
                     atol=1e-12)
-
-
-# Helical path at t = 1 s, as two engines gave it elsewhere: to all printed digits.
-REFERENCE_FORCE = (
-    -2.9771662, 5.22152482, -2.24435861, 13.41786397, 13.49724443, 13.3886266)
-REFERENCE_PASSIVE = (
-    0.11757538, -0.03910791, -0.07846746, -0.07264624, 0.13252167, -0.05987543)
-HALF_OF_THE_LAST_DIGIT = 0.5e-8
-
-
-def helical_motion_at_1_second() -> PlatformMotion:
-    """Return the paper's path at t = 1 s, from its closed form with lambda = 2 t^2 / pi."""
-    t, R, pitch = 1.0, 0.15, 0.1 / (2 * np.pi)
-    angle, rate, gain = 2 / np.pi * t ** 2, 4 / np.pi * t, 4 / np.pi
-    c, s = np.cos(angle), np.sin(angle)
-    return PlatformMotion(
-        (R * c, R * s, 0.5 + pitch * angle), (0, 0, 0, 1),
-        (-R * s * rate, R * c * rate, pitch * rate), (0, 0, 0),
-        (-R * (s * gain + c * rate ** 2), R * (c * gain - s * rate ** 2), pitch * gain),
-        (0, 0, 0))
-
-
-CONSTANT_RESISTANCE = {'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
-
-
-def test_reference_values_of_the_helical_path():
-    forces = paper_model(CONSTANT_RESISTANCE).drive_forces(helical_motion_at_1_second())
-    assert_allclose(forces.parts['rigid_body'], [REFERENCE_FORCE], rtol=0,
-                    atol=HALF_OF_THE_LAST_DIGIT)
-    assert_allclose(forces.parts['passive_friction'], [REFERENCE_PASSIVE], rtol=0,
-                    atol=HALF_OF_THE_LAST_DIGIT)

@@ -26,7 +26,7 @@ from random_states import (
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect, flattened
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.places import PLATFORM
 
 EFFECTS = {name: paper_model().bound(effect) for name, effect in CATALOGUE.items()
@@ -244,13 +244,13 @@ def test_forces_follow_the_coefficients(case, name) -> None:
 def test_an_effect_comes_back_from_its_file_and_from_its_coefficients(name) -> None:
     effect = EFFECTS[name]
     once = effect.from_file(VALUES[name])
-    assert flattened(once.to_file()) == VALUES[name]
-    assert effect.from_file(once.to_file()) == once
+    assert {key: value for key, value in once.values.items() if key in VALUES[name]} == VALUES[name]
+    assert effect.from_file(once.values) == once
     coefficients = effect.to_coefficients(once.values)
     assert list(coefficients) == [c.name for c in effect.coefficients]
     assert effect.from_coefficients(coefficients) == pytest.approx(VALUES[name], rel=1e-14)
     again = effect.at(coefficients)
-    assert effect.from_file(again.to_file()).values == pytest.approx(VALUES[name], rel=1e-14)
+    assert effect.from_file(again.values).values == pytest.approx(VALUES[name], rel=1e-14)
 
 
 @every_effect

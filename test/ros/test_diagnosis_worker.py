@@ -15,11 +15,7 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.diagnosis_worker import (
-    DiagnosisWorker,
-    StreamWindow,
-    StreamWindows,
-)
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
 
 SECOND = 1_000_000_000
 EPOCH = 1_700_000_000 * SECOND
@@ -66,10 +62,10 @@ def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
     worker = DiagnosisWorker()
     try:
         worker.submit(model.values, model.source, samples)
-        os.kill(worker._process.pid, signal.SIGKILL)
+        os.kill(process_of(worker), signal.SIGKILL)
         assert 'ended' in waited_for(worker)['error']
         worker.submit(model.values, model.source, samples)
-        assert os.getpriority(os.PRIO_PROCESS, worker._process.pid) >= 0
+        assert os.getpriority(os.PRIO_PROCESS, process_of(worker)) >= 0
         answer = waited_for(worker)
         assert answer['effects'] == []
         assert answer['verdict'] == 'adequate'
@@ -77,6 +73,11 @@ def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
     finally:
         worker.close()
     assert not worker.busy
+
+
+def process_of(worker: DiagnosisWorker) -> int:
+    assert worker._process is not None
+    return worker._process._process.pid
 
 
 def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:

@@ -11,13 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from feedforward_bench import (
-    EQUAL,
-    FeedforwardBench,
-    feedforward_bench,
-    message_of,
-    random_motion,
-)
+from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 

@@ -15,9 +15,7 @@ from node_bench import bench
 from rcl_interfaces.srv import ListParameters
 from ros_processes import environment, executable, node_process
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import (
-    MultiDOFJointTrajectory,
-)
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 

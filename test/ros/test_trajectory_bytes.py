@@ -17,11 +17,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import (
-    JointTrajectory,
-    JointTrajectoryPoint,
-    MultiDOFJointTrajectory,
-)
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -29,13 +25,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import (
-    RequestReader,
-    joint_reader,
-    read_joint_trajectory,
-    read_trajectory,
-    reader_for,
-)
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, RequestReader, readers_for
 
 pytestmark = pytest.mark.nodes
 
@@ -54,7 +44,7 @@ def random_message(points: int, seed: int) -> MultiDOFJointTrajectory:
 
 
 def poses() -> RequestReader:
-    return reader_for(DriveModel.load())
+    return readers_for(DriveModel.load())[TRAJECTORY]
 
 
 def outcome(read: Callable[..., Any], *what: Any) -> object:
@@ -78,13 +68,6 @@ def from_bytes(reader: RequestReader, message: Any) -> object:
     return outcome(reader.read, data)
 
 
-@settings(max_examples=200)
-@given(POINTS, SEEDS)
-def test_bytes_and_objects_give_the_same_numbers(points: int, seed: int) -> None:
-    message = random_message(points, seed)
-    assert from_bytes(poses(), message) == outcome(read_trajectory, message)
-
-
 LEGS = tuple(f'leg_{k}' for k in range(1, 7))
 
 
@@ -101,54 +84,12 @@ def joint_message(points: int, seed: int, joints: Sequence[str] = LEGS) -> Joint
     return message
 
 
-@settings(max_examples=100)
-@given(st.integers(1, 8), POINTS, SEEDS)
-def test_joints_are_read_from_bytes_as_from_objects(joints: int, points: int, seed: int) -> None:
-    names = tuple(f'j{"o" * k}int' for k in range(joints))
-    message = joint_message(points, seed, names)
-    assert from_bytes(joint_reader(names), message) == outcome(
-        read_joint_trajectory, message, names)
-
-
 @pytest.mark.parametrize('order', [LEGS, LEGS[::-1], (*LEGS[2:], *LEGS[:2])])
 def test_joints_come_in_any_order_and_frame(order: tuple[str, ...]) -> None:
     message = joint_message(2, 3, order)
     message.header.frame_id = 'map'
-    assert from_bytes(joint_reader(LEGS), message) == outcome(
-        read_joint_trajectory, message, LEGS)
-
-
-@settings(max_examples=200)
-@given(POINTS, SEEDS)
-def test_joint_messages_of_another_layout_are_left_to_the_ordinary_path(
-    points: int, seed: int,
-) -> None:
-    rng = np.random.default_rng(seed)
-    message = joint_message(points, seed)
-    point = message.points[int(rng.integers(points))]
-    field = str(rng.choice(['positions', 'velocities', 'accelerations', 'effort', 'names']))
-    if field == 'names':
-        message.joint_names = rng.permutation(LEGS).tolist()[:int(rng.integers(5, 7))]
-    else:
-        setattr(point, field, [0.5] * int(rng.choice([0, 5, 7] if field != 'effort' else [1, 6])))
-    assert outcome(joint_reader(LEGS).read, serialize_message(message)) == outcome(
-        read_joint_trajectory, message, LEGS)
-
-
-@settings(max_examples=200)
-@given(POINTS, SEEDS)
-def test_changed_joint_bytes_give_the_ordinary_numbers_or_a_rejection(
-    points: int, seed: int,
-) -> None:
-    rng = np.random.default_rng(seed)
-    data = bytearray(serialize_message(joint_message(points, seed)))
-    for _ in range(int(rng.integers(1, 5))):
-        data[int(rng.integers(len(data)))] = int(rng.integers(256))
-
-    def ordinary(data: bytes, now: int, missing: str) -> Any:
-        return read_joint_trajectory(message_in(data, JointTrajectory), LEGS, now, missing)
-
-    assert outcome(joint_reader(LEGS).read, bytes(data)) == outcome(ordinary, bytes(data))
+    reader = RequestReader(JointTrajectory, LEGS)
+    assert from_bytes(reader, message) == outcome(reader.of_message, message)
 
 
 def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
@@ -173,31 +114,63 @@ def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
         point.velocities, point.accelerations = [], point.accelerations * 2
 
 
+def alter_joints(message: JointTrajectory, rng: np.random.Generator) -> None:
+    """Change what makes the layout."""
+    point = message.points[int(rng.integers(len(message.points)))]
+    field = str(rng.choice(['positions', 'velocities', 'accelerations', 'effort', 'names']))
+    if field == 'names':
+        message.joint_names = rng.permutation(LEGS).tolist()[:int(rng.integers(5, 7))]
+    else:
+        setattr(point, field, [0.5] * int(rng.choice([0, 5, 7] if field != 'effort' else [1, 6])))
+
+
+# How a random message is made, how its layout is changed, and what reads it.
+KINDS = {
+    'poses': (random_message, alter, poses()),
+    'joints': (joint_message, alter_joints, RequestReader(JointTrajectory, LEGS))}
+every_kind = pytest.mark.parametrize('kind', KINDS)
+
+
+@every_kind
+@settings(max_examples=200)
+@given(POINTS, SEEDS)
+def test_bytes_and_objects_give_the_same_numbers(kind: str, points: int, seed: int) -> None:
+    make, _, reader = KINDS[kind]
+    message = make(points, seed)
+    assert from_bytes(reader, message) == outcome(reader.of_message, message)
+
+
+@every_kind
 @settings(max_examples=300)
 @given(POINTS, SEEDS)
 def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
-    points: int, seed: int,
+    kind: str, points: int, seed: int,
 ) -> None:
-    message = random_message(points, seed)
-    alter(message, np.random.default_rng(seed))
-    assert outcome(poses().read, serialize_message(message)) == outcome(read_trajectory, message)
+    make, change, reader = KINDS[kind]
+    message = make(points, seed)
+    change(message, np.random.default_rng(seed))
+    assert outcome(reader.read, serialize_message(message)) == outcome(reader.of_message, message)
 
 
+@every_kind
 @settings(max_examples=200)
 @given(POINTS, SEEDS)
-def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(points: int, seed: int) -> None:
+def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(
+    kind: str, points: int, seed: int,
+) -> None:
+    make, _, reader = KINDS[kind]
     rng = np.random.default_rng(seed)
-    data = bytearray(serialize_message(random_message(points, seed)))
+    data = bytearray(serialize_message(make(points, seed)))
     for _ in range(int(rng.integers(1, 5))):
         data[int(rng.integers(len(data)))] = int(rng.integers(256))
 
-    def ordinary(data: bytes, now: int, missing: str) -> Any:
-        return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, missing)
+    def by_object(data: bytes, now: int, missing: str) -> Any:
+        return reader.of_message(message_in(data, reader.message), now, missing)
 
-    assert outcome(poses().read, bytes(data)) == outcome(ordinary, bytes(data))
+    assert outcome(reader.read, bytes(data)) == outcome(by_object, bytes(data))
 
 
-@pytest.mark.parametrize('reader', [poses(), joint_reader(LEGS)])
+@pytest.mark.parametrize('reader', [poses(), RequestReader(JointTrajectory, LEGS)])
 def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected(reader: RequestReader) -> None:
     data = bytearray(serialize_message(
         random_message(1, 2) if reader.message is MultiDOFJointTrajectory else joint_message(1, 2)))

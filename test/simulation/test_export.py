@@ -154,26 +154,6 @@ def test_what_is_not_expressed_is_named_and_is_what_is_missing(tmp_path: Path) -
     assert [engine.actuator(k).name for k in range(engine.nu)] == list(DRIVES)
 
 
-def test_the_robot_stands_in_the_simulator_on_the_forces_of_the_model() -> None:
-    model = paper()
-    engine = mujoco.MjModel.from_xml_string(text_of(model, MJCF))
-    data = mujoco.MjData(engine)
-    mujoco.mj_resetDataKeyframe(engine, data, engine.key('home').id)
-    mujoco.mj_forward(engine, data)
-    start = data.body('platform').xpos.copy()
-    rest = Excitation().motion([0.0])
-    assert rest.position[0] == pytest.approx(start)
-    data.ctrl[:] = model.drive_forces(rest).total[0]
-    for _ in range(100):
-        mujoco.mj_step(engine, data)
-    assert data.body('platform').xpos == pytest.approx(start, abs=1e-3)
-    data.ctrl[3:] = 0.0
-    for _ in range(100):
-        mujoco.mj_step(engine, data)
-    assert data.body('platform').xpos[2] < start[2] - 0.05
-    assert np.abs(data.efc_pos[:9]).max() < 2e-3  # the balls hold while it falls
-
-
 @pytest.mark.parametrize('name', ['hexapod', 'delta'])
 @pytest.mark.parametrize('kind', [MJCF, URDF])
 def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:

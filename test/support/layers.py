@@ -19,14 +19,6 @@ MAY_USE = {
     'ros': {'system', 'physics', 'measurement', 'simulation', 'inference'},
     'app': {'system', 'physics', 'measurement', 'simulation', 'inference', 'ros'},
 }
-# What nodes do to arrays: make, arrange and check them, and sum up how old and how long. The rest
-# of numpy and math is mathematics, and belongs to physics.
-ARRANGING = frozenset(f'numpy.{name}' for name in (
-    'abs', 'all', 'any', 'append', 'arange', 'array', 'asarray', 'ascontiguousarray', 'clip',
-    'concatenate', 'divmod', 'dtype', 'empty', 'frombuffer', 'inf', 'int64', 'isfinite', 'median',
-    'minimum', 'nan', 'nanmax', 'ndarray', 'percentile', 'ptp', 'random.default_rng', 'stack',
-    'tile', 'typing.NDArray', 'where', 'zeros', 'zeros_like')) | {'math.inf', 'math.isfinite'}
-MATHEMATICS = ('numpy', 'math', 'cmath', 'scipy')
 # Inside a layer, a folder uses itself and those before it.
 FOLDERS = {
     'physics': ['mechanism', 'effects', 'three_pprs', 'model'],
@@ -71,31 +63,3 @@ def circles(graph: dict[Path, set[Path]]) -> set[Path]:
 
 def files() -> list[Path]:
     return sorted(file for file in PACKAGE.rglob('*.py') if file.parent != PACKAGE)
-
-
-def mathematics(text: str) -> set[str]:
-    """Return what a file's code calculates that a node must not, under whatever name it has it."""
-    tree = ast.parse(text)
-    meant: dict[str, str] = {}  # what a name in the file stands for
-    inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    found: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                meant[alias.asname or alias.name.split('.')[0]] = (
-                    alias.name if alias.asname else alias.name.split('.')[0])
-                found |= {alias.name} if '.' in alias.name else set()
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {f'{node.module}.{alias.name}' for alias in node.names}
-        elif isinstance(node, (ast.BinOp, ast.AugAssign)):
-            powers = (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
-                      and not isinstance(node.left, ast.Constant))
-            found |= {'@'} if isinstance(node.op, ast.MatMult) else {'**'} if powers else set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and id(node) not in inner:
-            chain = ast.unparse(node)
-            if chain.replace('.', '').isidentifier():  # else it belongs to what a call returns
-                first, *rest = chain.split('.')
-                found.add('.'.join([meant.get(first, first), *rest]))
-    return {name for name in found if name in ('@', '**') or (
-        name.split('.')[0] in MATHEMATICS and name not in ARRANGING)}

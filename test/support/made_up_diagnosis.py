@@ -13,11 +13,7 @@ import numpy as np
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import (
-    FoundEffect,
-    RankedEffect,
-    RankedSet,
-)
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RankedEffect, RankedSet
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals

@@ -12,13 +12,49 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.measurement.files.samples import Defect
 
 STORE = get_typestore(Stores.ROS2_KILTED)
+# Definitions of messages that have no wheel, as a bag carries them.
+DYNAMIC, CONTROLLER = (f'control_msgs/msg/{name}' for name in (
+    'DynamicJointState', 'JointTrajectoryControllerState'))
+BREAK = '=' * 80 + '\n'
+DEFINITIONS = {
+    DYNAMIC: f'''std_msgs/Header header
+string[] joint_names
+control_msgs/InterfaceValue[] interface_values
+{BREAK}MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+''',
+    CONTROLLER: f'''std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint reference
+trajectory_msgs/JointTrajectoryPoint feedback
+trajectory_msgs/JointTrajectoryPoint error
+trajectory_msgs/JointTrajectoryPoint output
+{BREAK}MSG: trajectory_msgs/JointTrajectoryPoint
+float64[] positions
+float64[] velocities
+float64[] accelerations
+float64[] effort
+builtin_interfaces/Duration time_from_start
+'''}
+
+
+def with_definitions(store: Any) -> Any:
+    """Return a store of types that has those of `DEFINITIONS` as well."""
+    for name, text in DEFINITIONS.items():
+        found = get_types_from_msg(text, name)
+        store.register({key: one for key, one in found.items() if key not in store.types})
+    return store
+
+
+with_definitions(STORE)
 STATE = 'sensor_msgs/msg/JointState'
 STEP = 0.002
 # Steps of the plain recordings have exactly these nanoseconds, so that all formats say the same.
@@ -55,25 +91,31 @@ def the(recording: Recording, kind: str) -> Defect:
     return finding
 
 
-def message(stamp: int, names: Any, position: Any, velocity: Any, effort: Any) -> Any:
-    types = STORE.types
-    return types[STATE](
-        types['std_msgs/msg/Header'](
-            types['builtin_interfaces/msg/Time'](stamp // 10**9, stamp % 10**9), 'base'),
-        list(names), *(np.array(values, dtype=float) for values in (position, velocity, effort)))
+def header(stamp: int, frame: str = 'base') -> Any:
+    """Return a header with a stamp [ns]."""
+    return STORE.types['std_msgs/msg/Header'](
+        STORE.types['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9)), frame)
+
+
+def message(stamp: int, names: Any, position: Any, velocity: Any = (), effort: Any = ()) -> Any:
+    return STORE.types[STATE](header(stamp), list(names), *(
+        np.array(values, dtype=float) for values in (position, velocity, effort)))
 
 
 def write_plain_bag(
     path: Path, messages: dict[str, list[Any]], storage: StoragePlugin = StoragePlugin.MCAP,
     received: Callable[[int], int] = lambda k: k * STEP_NS, msgtype: str = STATE,
+    pack: Callable[[Writer], None] = lambda writer: None,
 ) -> Path:
     """Write what a recorder of ROS would: messages, or their bytes, by topic."""
-    with Writer(path, version=9, storage_plugin=storage) as writer:
+    writer = Writer(path, version=9, storage_plugin=storage)
+    pack(writer)
+    with writer:
         for topic, states in messages.items():
-            connection = writer.add_connection(topic, msgtype, typestore=STORE)
+            kind = getattr(states[0], '__msgtype__', msgtype) if states else msgtype
+            connection = writer.add_connection(topic, kind, typestore=STORE)
             for k, state in enumerate(states):
-                data = (state if isinstance(state, bytes)
-                        else STORE.serialize_cdr(state, connection.msgtype))
+                data = state if isinstance(state, bytes) else STORE.serialize_cdr(state, kind)
                 writer.write(connection, received(k), data)
     return path
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.robot import ThreePprs
+from pprs_dynamics.physics.three_pprs.robot import ClosedForm, ThreePprs
 
 ELBOWS = ('up', 'down')
 REACH, TURN = 0.1, 0.2  # of the sampled workspace around home [m, rad]
@@ -53,6 +53,11 @@ def random_masses(rng: np.random.Generator) -> Masses:
         rng.uniform(0.5, 2), rng.uniform(0, 2), tuple(rng.uniform(0.2, 1, 3)),
         tuple(rng.uniform(0.2, 1, 3)), tuple(rng.uniform(0.05, 0.5, 3)),
         tuple(rng.uniform(-0.05, 0.05, 3)), tuple(float(element) for element in inertia))
+
+
+def inverse_kinematics(geometry: Geometry, motion: PlatformMotion) -> ClosedForm:
+    """Return the motion of chains and drives that belongs to a platform motion."""
+    return ClosedForm(ThreePprs(geometry, random_masses(np.random.default_rng(0))), motion)
 
 
 def paper_geometry(elbow: str = 'up') -> Geometry:

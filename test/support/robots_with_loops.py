@@ -155,7 +155,7 @@ def three_pprs(model: Any, home: Any) -> RobotText:
         robot.joint(f'lift_{n}', 'prismatic', f'slider_{n}', f'carriage_{n}')
         robot.joint(f'hinge_{n}', 'continuous', f'carriage_{n}', f'rod_{n}', axis=along)
         robot.loop(f'ball_{n}', 'spherical', f'rod_{n}', (0, 0, length), 'platform', ball)
-        chains = home.links.chains
+        chains = home.links
         robot.home[f'hinge_{n}'] = float(np.arctan2(-chains.cos_u[0, i], chains.sin_u[0, i]))
         for kind, at in (('slide', i), ('lift', 3 + i)):
             robot.home[f'{kind}_{n}'] = float(home.position[0, at])

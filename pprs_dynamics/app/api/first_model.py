@@ -34,8 +34,9 @@ from pprs_dynamics.inference.readings.table import (
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
-from pprs_dynamics.measurement.files.contents import Contents, Series, look_into
+from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE, read_column
 from pprs_dynamics.measurement.files.way_out import common_prefix
 from pprs_dynamics.physics.mechanism.branches import (

@@ -1,6 +1,6 @@
 /* Asking the workbench's server, and what is known of its state. */
 
-/* A header and named arrays, as `packing.py` writes them. */
+/* A header and named arrays, as `wire.py` writes them. */
 export const unpack = (buffer) => {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
@@ -16,15 +16,6 @@ export const unpack = (buffer) => {
 
 export const rowsOf = ({values, shape}) => Array.from({length: shape[0]}, (_, k) =>
   values.subarray(k * shape[1], (k + 1) * shape[1]));
-
-/* A state with what has changed of it since; effects change one by one. */
-export const merged = (state, changes) => {
-  const effects = new Map([...(state?.effects ?? []), ...(changes.effects ?? [])].map(
-    (one) => [one.name, one]));
-  const next = {...state, ...changes};
-  next.effects = (next.effect_names ?? []).map((name) => effects.get(name));
-  return next;
-};
 
 const answered = async (url, options) => {
   const response = await fetch(url, options);
@@ -56,11 +47,11 @@ export class Client {
   ask(path, body) {
     return request(path, body === undefined ? {} : {
       method: 'POST', headers: {'Content-Type': 'application/json'},
-      body: JSON.stringify({...body, since: this.state?.version ?? -1})});
+      body: JSON.stringify({...body, drawn: this.state?.drawn ?? ''})});
   }
 
   upload(file, query) {
-    return request(`upload?${new URLSearchParams({...query, since: this.state?.version ?? -1})}`,
+    return request(`upload?${new URLSearchParams({...query, drawn: this.state?.drawn ?? ''})}`,
                    {method: 'POST', body: file});
   }
 
@@ -73,7 +64,7 @@ export class Client {
     const last = this.state;
     // An answer that was overtaken by a later one holds nothing new.
     if (last && header.version < last.version) return;
-    this.state = merged(last, header);
+    this.state = header;
     this.show(last, this.state, arrays);
   }
 
@@ -120,7 +111,7 @@ export class Client {
     this.isRefreshing = true;
     while (!this.underway && (!this.state || this.heard > this.state.version)) {
       try {
-        const found = await this.ask(`screen?since=${this.state?.version ?? -1}`);
+        const found = await this.ask(`screen?${new URLSearchParams({drawn: this.state?.drawn ?? ''})}`);
         if (this.heard === Infinity) this.heard = found.header.version;
         this.take(found);
       } catch (error) {

@@ -53,7 +53,7 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[SurveyedRecording]:
     """
     for pattern in patterns:
         places = [pattern] if os.path.exists(pattern) else sorted(glob.glob(pattern))
-        found = [path for place in places for path in _in_folder(Path(place))]
+        found = [path for place in places for path in recordings_in(Path(place))]
         if not found:
             raise UnreadableFileError(pattern or "''", 'there is no recording: no file, no '
                                       f'folder with {", ".join(ENDINGS)} or bags, and no match')
@@ -61,16 +61,14 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[SurveyedRecording]:
             yield SurveyedRecording(str(path), path.absolute().parent.name or 'robot')
 
 
-def _in_folder(place: Path) -> Iterator[Path]:
-    if not place.is_dir():
-        yield place
-        return
-    if (place / BAG).exists():
+def recordings_in(place: Path) -> Iterator[Path]:
+    """Yield the bags and files of recordings in a folder, hidden ones left out; or a file."""
+    if not place.is_dir() or (place / BAG).exists():
         yield place
         return
     for path in sorted(place.iterdir()):
-        if path.is_dir() or path.suffix in ENDINGS:
-            yield from _in_folder(path)
+        if (path.is_dir() or path.suffix in ENDINGS) and not path.name.startswith('.'):
+            yield from recordings_in(path)
 
 
 def read_manifest(path: str) -> Iterator[SurveyedRecording]:

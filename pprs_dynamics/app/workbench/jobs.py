@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
+from pprs_dynamics.app.workbench.background import Cancelled, Job
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.ticks import Ticks
@@ -30,7 +30,9 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.worker_process import run_in_process as run
 
+run_in_process = partial(run, niceness=2)  # whoever clicks comes first
 RATE = 100.0  # of the poses of a designed motion [Hz], the default of play_trajectory
 Progress = Callable[[float], None]
 

@@ -21,7 +21,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedSet,
     RivalEffect,
 )
-from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.quantities import listed, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.regression.terms import OperatingPoint
@@ -188,10 +187,11 @@ class Answer:
     @cached_property
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects of the row; those whose force removes most of the error first."""
-        found = [self._effect(candidate) for candidate in Row(self.fits, self.fitted).effects]
+        found = [self.found(candidate) for candidate in Row(self.fits, self.fitted).effects]
         return tuple(sorted(found, key=lambda effect: -effect.share))
 
-    def _effect(self, candidate: EffectCandidate) -> FoundEffect:
+    def found(self, candidate: EffectCandidate) -> FoundEffect:
+        """Return an effect of the row with its values and errors."""
         fits, fitted, force = self.fits, self.fitted, self.force(candidate)
         estimates = averaged(estimate(fits, fitted, candidate, fitted.is_dated),
                              self._nearly(candidate))
@@ -346,7 +346,7 @@ class Answer:
                     evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
 
     def _depends_on(self) -> tuple[Statement, ...]:
-        """Return patterns of no catalogue, and drives whose slow noise exceeds that of others."""
+        """Return patterns of no catalogue."""
         statements = []
         by_drive = {pattern.d: pattern for pattern in self.table.patterns}
         for candidate in self.fitted.unknowns:
@@ -355,10 +355,6 @@ class Answer:
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
                     by_drive[d], candidate, self.fitted.fit.of(block), evidence))
-        statements += [
-            statement for name, statement in levels(
-                self.fits.regression.residuals, dict(self.noise), self.decisions).items()
-            if statement.amplitude > self._form_error[self.drives.index(name)]]
         return tuple(sorted(statements, key=lambda statement: -statement.evidence))
 
     # Queries on the table
@@ -455,30 +451,15 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     table = diagnosis.selection
     if table is None:
         return ()
+    reported = {c.name: c.placed_name for c in table.best.effects}
     found = []
-    adopted = {c.name: c.placed_name for c in table.best.effects}
-    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
-                     for name in names[1:]):
-        row = next((row for row in table.rows
-                    if any(name in (c.name, c.placed_name) for c in row.effects)
-                    and adopted[of] not in row.placed_names), None)
-        if row is None:
-            continue
-        candidate = next(c for c in row.effects if name in (c.name, c.placed_name))
-        remaining = linear_residual(row.fits, row.fitted)
-        found.append(RivalEffect(
-            candidate.effect, row.fits.design.named(candidate.drives),
-            estimate(row.fits, row.fitted, candidate).parameters,
-            row.fits.components.force(row.fitted, candidate, remaining.shape), of,
-            linear_error(row.fits, row.fitted), _held_out_error(row, validate),
-            row.cost - table.best.cost, remaining))
+    for of, *names in diagnosis.indistinguishable:
+        for name in names:
+            row = next(row for row in table.rows if reported[of] not in row.placed_names
+                       and any(name in (c.name, c.placed_name) for c in row.effects))
+            answer = Answer(table, row, validate, diagnosis.decisions)
+            candidate = next(c for c in answer.fitted.effects
+                             if name in (c.name, c.placed_name))
+            found.append(RivalEffect(answer.found(candidate), of, row.cost - table.best.cost,
+                                     answer.remaining))
     return tuple(found)
-
-
-def _held_out_error(row: Row, validate: Sequence[Recording]) -> float:
-    if not validate:
-        return hold_out(row.fits, row.fitted).error
-    try:
-        return rms(measure_residuals(model_of(row.fits, row.fitted), validate)[0])
-    except PprsError:
-        return float('nan')

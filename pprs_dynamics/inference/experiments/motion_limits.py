@@ -14,8 +14,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
+from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from
 WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
@@ -60,7 +60,8 @@ class MotionLimits:
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
         rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
-        height = float(sum(end[-1] for end in model.strokes)) / 2 + geometry.elbow_sign * rise
+        middle = float(sum(end[-1] for end in model.limits.strokes)) / 2
+        height = middle + geometry.elbow_sign * rise
         return np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
 
     def excursions(self, model: DriveModel, position: Array, velocity: Array,
@@ -72,7 +73,7 @@ class MotionLimits:
     def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
         """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
         state, bounds, left = forces.mechanism, model.robot.bounds, 1 - self.margin
-        limits, chains = model.limits, state.links.chains
+        limits, chains = model.limits, state.links
         lower, upper = limits.strokes
         sine = bounds.rod_sine + self.margin * (1 - bounds.rod_sine)
         shares = {

@@ -170,7 +170,8 @@ class Experiment:
     @property
     def load(self) -> float | None:
         """Mass that the tool should carry more in a second recording [kg]; None: no need."""
-        return float(f'{LOAD_SHARE * self.model.moved_mass:.1g}') if self.told_by_load else None
+        mass = self.model.robot.moved_mass
+        return float(f'{LOAD_SHARE * mass:.1g}') if self.told_by_load else None
 
     @property
     def text(self) -> str:

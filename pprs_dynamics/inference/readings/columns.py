@@ -16,8 +16,10 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
-from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+
+TIME_WORDS = {'time', 'micros', 'millis', *TIME_LIKE, *table.TIME_WORDS}
 
 
 class GuessError(PprsError, ValueError):
@@ -97,6 +99,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     """
     time, time_scale, notes = _time(series, rate is not None)
     left = [one for one in series if time is None or one.column != time.column]
+    if not left:
+        raise GuessError('no column holds numbers beside times')
     # pandas numbers rows in a column without a title.
     titled = [one for one in left if one.title]
     if titled:
@@ -127,7 +131,7 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
 
 def words_of(title: str) -> list[str]:
     """Return the words and numbers that a name is made of, in lower case."""
-    parts = re.sub(r'([a-z])([A-Z])', r'\1 \2', title)
+    parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', title.replace('_', ' '))  # not in mA
     return [each for word in re.findall(r'[a-z]+|\d+', parts.lower()) for each in _split(word)]
 
 
@@ -155,13 +159,14 @@ def _time(series: Sequence[Series], has_rate: bool,
     """Return the column of times, its unit [s] where it is not seconds, and comments."""
     rising = [each for each in series if _rises(each.values)]
     named = [each for each in rising if each.title in TIME_COLUMNS] or [
-        each for each in rising if {*words_of(each.title)} & {'time', 'zeit', *TIME_LIKE}]
+        each for each in rising if {*words_of(each.title)} & TIME_WORDS]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
         # Positions may rise as well: with a rate no column is needed.
-        even = [] if has_rate else [each for each in rising if not each.title
-                                    and _is_even(each.values)]
+        even = [] if has_rate else [
+            each for each in rising if _is_even(each.values)
+            and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
         if not even:
             return None, None, notes
         found = even[0]
@@ -184,6 +189,10 @@ def _rises(values: Array) -> bool:
 def _is_even(values: Array) -> bool:
     steps = np.diff(values[np.isfinite(values)])
     return bool(np.mean(np.abs(steps - np.median(steps)) < 4 * np.median(steps)) > 0.9)
+
+
+def _counts_rows(values: Array) -> bool:
+    return bool(np.all(np.diff(values[np.isfinite(values)]) == 1))
 
 
 # ------------------------------------------------------------------------------------ names
@@ -221,6 +230,8 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
             continue
         if each == CURRENT and any(kind == EFFORT for _, kind in columns):
             continue
+        best = _last_of(best, [key for key in groups if _fit(key, groups[key], each, quantity)
+                               == _fit(best, groups[best], each, quantity)], groups, series)
         if {*best} & table.COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
         columns.update({(joint, each): column for joint, column in groups[best].items()})
@@ -232,14 +243,36 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     return columns, notes
 
 
+def _last_of(best: tuple[str, ...], rivals: Sequence[tuple[str, ...]],
+             groups: Mapping[tuple[str, ...], Mapping[str, Column]], series: Sequence[Series],
+             ) -> tuple[str, ...]:
+    """Return the group that moves last of those that move alike: commands come first."""
+    values = {one.column: one.values for one in series}
+
+    joint = max(groups[best], key=lambda joint: np.nanstd(values[groups[best][joint]]))
+    return max((key for key in rivals if joint in groups[key]), key=lambda key: _lag(
+        values[groups[best][joint]], values[groups[key][joint]])) if len(rivals) > 1 else best
+
+
+def _lag(values: Array, other: Array) -> int:
+    """Return by how many samples other values come later; 0 where they do not move alike."""
+    first, second = np.diff(np.nan_to_num(values)), np.diff(np.nan_to_num(other))
+    count = len(first) - table.LONGEST_LAG
+    if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
+        return 0
+    found = {sign * k: float(np.corrcoef(early[:count], late[k:count + k])[0, 1])
+             for sign, early, late in ((-1, second, first), (1, first, second))
+             for k in range(table.LONGEST_LAG)}
+    best = max(found, key=lambda lag: found[lag])
+    return best if found[best] > table.COPY else 0
+
+
 def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
          ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
     told = {kind for kind, words in table.WORDS.items() if {*key} & {*words}}
-    if {*key} & {'joint', 'joints', 'state'} and len(told) > 1:
-        told.discard(POSITION)  # "joint torque" is no position
-    if {*key} & {*table.WORDS[POSITION][:7]}:
-        told.add(POSITION)
+    if not told and {*key} & table.OF_JOINTS:
+        told.add(POSITION)  # "joint torque" is no position
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
     # The name of the joint alone is a position, as in `shoulder_pan`.

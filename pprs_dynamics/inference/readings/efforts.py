@@ -63,7 +63,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
             return [OtherReading.of(
                 'ambiguous', model.drives, every, f'{found.what}, or in amperes: the factors are '
                 + ', '.join(f'{scale:.3g}' for scale in scales), f'{line} or {gains_line}')]
-    limits = model.effort_limits[[*certain]]
+    limits = model.limits.efforts[[*certain]]
     if len(certain) > 1 and has_weight and np.all(np.isfinite(limits)):
         gains = np.log(sizes * limits)
         are_one = (np.std(np.log(sizes)) > table.SEVERAL_FACTORS
@@ -77,7 +77,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
                                 and np.any(np.abs(np.log(sizes)) > table.SEVERAL_FACTORS))
             if is_share:
                 return [_unit(model, f"{of_all} looks like {name} of the drives' largest",
-                              sign * share * model.effort_limits)]
+                              sign * share * model.limits.efforts)]
     # A load may multiply what one drive of several needs.
     if has_weight and len(certain) >= min(2, len(every)) and np.all(
             np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(

@@ -57,7 +57,7 @@ REVERSAL = 0.2
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
         'drive_constant': 10.0}
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
@@ -105,15 +105,17 @@ BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
 # Words of a title, and the quantity that they tell.
 WORDS = {
-    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'state', 'qpos',
-               'joint', 'joints', 'x', 'actual'),
+    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'qpos', 'enc',
+               'encoder', 'ticks', 'winkel', 'lage'),
     VELOCITY: ('velocity', 'velocities', 'vel', 'dq', 'qd', 'qdot', 'dtheta', 'speed', 'omega',
-               'qvel', 'dpos', 'v'),
+               'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
     EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'force', 'moment', 'load',
-             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'f'),
+             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
-              'ma'),
+              'ma', 'strom'),
 }
+# These tell of a position where nothing else is told.
+OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
 # The same of what may be measured beside.
 CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
                  'pressure': {'pressure', 'pressures'}}
@@ -127,14 +129,16 @@ OTHERS = frozenset((
 # These tell of a command: taken only where nothing measured is there.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
-    'reference', 'goal', 'setpoint', 'sp', 'set', 'demand', 'demanded'))
+    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
 FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
-    'meas', 'measured', 'actual', 'act', 'real', 'fb', 'feedback', 'msr', 'sensor', 'link'))
+    'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
+    'link'))
 UNIT_WORDS = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math.pi / 180,
-                     'degrees': math.pi / 180, 'mm': 1e-3, 'mrad': 1e-3},
+                     'degrees': math.pi / 180, 'grad': math.pi / 180, 'rev': 2 * math.pi,
+                     'mm': 1e-3, 'mrad': 1e-3},
           VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
                      'mm': 1e-3, 'mms': 1e-3},
           EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
@@ -150,6 +154,7 @@ UNLIKE = 0.5  # correlation below which a column that is called a velocity is no
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
 LEAST_ROWS = 30
+LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
 SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
 
@@ -182,8 +187,6 @@ class Reading:
         Prior cost [nats].
     offset : (D,) array, optional
         Added to positions.
-    backwards : bool
-        Whether time runs the other way.
     """
 
     kind: str
@@ -193,7 +196,6 @@ class Reading:
     effort: Array
     cost: float
     offset: Array | float = 0.0
-    backwards: bool = False
 
     def effort_of(self, effort: Array) -> Array:
         """Return recorded efforts, (N, D), in this reading; NaN where not measured."""
@@ -242,8 +244,6 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: b
         yield Reading('position_sign', f'the {_position(drives, group)} negated', group,
                       np.diag(_scaled(count, group, -1.0)), same, COST['position_sign'] + (
                           ALL_NEGATED if len(group) == count > 1 else 0.0))
-    yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
-                  'drives the motion', every, same, same, COST['reversed_time'], backwards=True)
     for order in _orders(count):
         moved = tuple(k for k in every if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)

@@ -128,7 +128,7 @@ class Sensitivities:
 
     def __init__(self, model: DriveModel, given: DriveModel) -> None:
         self.model, self.given = model, given
-        self.each: Callable[..., Iterable[Any]] = each if model.takes_long else map
+        self.each: Callable[..., Iterable[Any]] = each if model.robot.structure is not None else map
         self.numbers = model_numbers(given)
         present = {effect.name for effect in given.effects}
         self.searched: tuple[type[StructureEffect], ...] = tuple(
@@ -230,7 +230,7 @@ class Sensitivities:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
         for effect in self.model.effects:
             if isinstance(effect, MeasurementEffect):
-                column = effect.seen(column, state)
+                column = effect.measured(column, state)
         return column
 
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:

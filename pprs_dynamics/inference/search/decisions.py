@@ -67,9 +67,6 @@ class Decisions:
     # How nearly an effect must pay to be listed as a suspect [deviance]. Odds of 12 to 1 against
     # it: more noise of the same sort would turn them.
     suspect_margin: float = 5.0
-    # A drive's slow noise over its fast noise, against its peers', above which the verdict is
-    # unknown. Robots have like drives; a factor of 3 in rms is an order of magnitude in power.
-    level_ratio: float = 3.0
     # Periods of a line within the longest stretch, below which it is a drift. Slow noise has
     # bumps of one or two periods.
     line_periods: float = 3.0

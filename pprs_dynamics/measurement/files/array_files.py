@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,13 +17,20 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.drives import Column
+from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.samples import Progress, Series
 
-PARQUET, MAT, NUMPY, JSON = ('.parquet', '.pq'), ('.mat',), ('.npz',), ('.json', '.jsonl')
+KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.npy': 'NumPy',
+         '.json': 'JSON', '.jsonl': 'JSON', '.ndjson': 'JSON'}
 BYTES_PER_CHARACTER = 8  # of JSON in memory
 INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
 DEEPEST = 6  # structures within structures of a MAT file
 LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joints for three hours
+WIDEST = 64  # elements of a list that may be joints
+ELEMENT = re.compile(r'(.+)\[(\d+)\]')
+MOST = 12  # names that are listed
+MATRIX = 'array'  # what a NumPy file of one array calls it
 
 
 @dataclass(frozen=True)
@@ -38,12 +46,90 @@ class ArrayTable:
         Returns arrays, (N,) or (N, K), by the names that are asked for.
     labels : mapping of str to sequence of K str
         What the elements of lists are, where the file says so.
+    decimal : str
+        As of `CsvTable`.
     """
 
     path: Path
     names: list[str]
     load: Callable[[Sequence[str]], Mapping[str, Any]]
     labels: Mapping[str, Sequence[str]]
+    decimal: str = '.'
+
+    def place(self, column: Column) -> tuple[str, int | None] | None:
+        """Return the name that a column is under, and which element of its lists it is."""
+        if column in self.names:
+            return str(column), None
+        element = ELEMENT.fullmatch(str(column))
+        return (element[1], int(element[2])) if element and element[1] in self.names else None
+
+    def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Any]:
+        """Return columns, (N,) each.
+
+        Raises
+        ------
+        UnreadableFileError
+            For a column that is missing, holds no numbers or has another length than others.
+        """
+        places = [self.place(column) for column in wanted]
+        if None in places:
+            raise UnreadableFileError(
+                self.path, f'no column {wanted[places.index(None)]}: its columns have names, '
+                + ', '.join(sorted(self.names)[:MOST]))
+        known = [place for place in places if place is not None]
+        loaded = self.load(list(dict.fromkeys(name for name, _ in known)))
+        arrays = [self._element(name, loaded[name], element) for name, element in known]
+        lengths = list(map(len, arrays))
+        if len({*lengths}) > 1:
+            short = lengths.index(min(lengths))
+            raise UnreadableFileError(
+                self.path, f'column {wanted[short]!r} has {lengths[short]} rows, must have '
+                f'{max(lengths)}, as others')
+        return arrays
+
+    def _element(self, name: str, values: Any, element: int | None) -> Any:
+        array = self._numbers(name, values)
+        if array.ndim == 1 and not element:
+            return array
+        if array.ndim != 2:
+            raise UnreadableFileError(self.path, f'column {name!r} has the shape {array.shape}, '
+                                      'must hold numbers, or lists of them')
+        count = array.shape[1]
+        if element is None or element >= count:
+            raise UnreadableFileError(self.path, f'column {name!r} holds lists of {count}, must be '
+                                      f'named {name}[0] to {name}[{count - 1}]')
+        return array[:, element]
+
+    def _numbers(self, name: str, values: Any) -> Any:
+        """Return numbers, (N,) or (N, K), of which there are more than of elements."""
+        array = np.asarray(values)
+        if np.issubdtype(array.dtype, np.datetime64):
+            array = array.astype('datetime64[ns]').astype(np.int64)
+        if array.dtype.kind == 'c' and np.any(array.imag):
+            raise UnreadableFileError(self.path, f'column {name!r} holds complex numbers, must '
+                                      'hold real ones: take its real part')
+        try:
+            array = array if array.dtype.kind in 'iu' else array.real.astype(float)
+        except (TypeError, ValueError):
+            raise UnreadableFileError(self.path, f'column {name!r} holds something else than '
+                                      'numbers') from None
+        array = np.squeeze(array) if array.size > 1 else array.ravel()
+        return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
+
+    def series(self, most: int) -> Iterator[Series]:
+        """Yield the first numbers of all columns and elements of lists."""
+        for name in self.names:
+            try:
+                values = self._numbers(name, self.load([name])[name])[:most].astype(float)
+            except UnreadableFileError:  # words, pictures
+                continue
+            if values.ndim == 1 and len(values) > 1:
+                yield Series(name, name, values)
+            elif values.ndim == 2 and values.shape[1] <= WIDEST:
+                labels = self.labels.get(name, ())
+                for k, column in enumerate(values.T):
+                    label = f' {labels[k]}' if len(labels) == values.shape[1] else f'[{k}]'
+                    yield Series(f'{name}[{k}]', '' if name == MATRIX else f'{name}{label}', column)
 
 
 def is_lerobot(path: Path) -> bool:
@@ -63,12 +149,27 @@ def open_arrays(path: Path) -> ArrayTable | None:
     """
     if path.is_dir():
         return _lerobot(path) if is_lerobot(path) else None
-    if path.suffix in PARQUET:
-        return _parquet(path, [path], {})
-    if path.suffix in (*MAT, *NUMPY, *JSON):
-        arrays = (_mat if path.suffix in MAT else _numpy if path.suffix in NUMPY else _json)(path)
-        return ArrayTable(path, list(arrays), lambda wanted: arrays, {})
-    return None
+    kind = KINDS.get(path.suffix)
+    if kind in (None, 'Parquet'):
+        return _parquet(path, [path], {}) if kind else None
+    with _readable(path, str(kind)):
+        arrays = {'MAT': _mat, 'NumPy': _numpy, 'JSON': _json}[str(kind)](path)
+    return ArrayTable(path, list(arrays), lambda wanted: arrays, {})
+
+
+@contextmanager
+def _readable(path: Path, kind: str) -> Iterator[None]:
+    """Make one sentence of a library's errors, which are of any kind where bytes are damaged."""
+    try:
+        yield
+    except PprsError:
+        raise
+    except NotImplementedError:
+        raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
+                                  ) from None
+    except Exception as error:
+        first = (str(error).splitlines() or [type(error).__name__])[0][:120]
+        raise UnreadableFileError(path, f'no {kind} file ({first})') from None
 
 
 def _lerobot(path: Path) -> ArrayTable:
@@ -96,41 +197,21 @@ def _labels(names: Any) -> list[str]:
 def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[str]],
              ) -> ArrayTable:
     try:
-        from pyarrow import ArrowException
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise MissingLibraryError('pyarrow', 'reading Parquet files', 'tables') from None
 
-    def opened(file: Path) -> Any:
-        try:
-            return ParquetFile(file)
-        except (ArrowException, OSError) as error:
-            raise UnreadableFileError(file, f'no Parquet file ({_first_line(error)})') from None
-
-    def names_of(file: Path) -> list[str]:
-        try:
-            return list(opened(file).schema_arrow.names)
-        except (ArrowException, UnicodeDecodeError) as error:
-            raise UnreadableFileError(file, f'damaged: its columns have no names in UTF-8 '
-                                      f'({_first_line(error)})') from None
-
     def load(wanted: Sequence[str]) -> Mapping[str, Any]:
-        parts = []
-        require_size(path, sum(_parquet_size(opened(file), wanted) for file in files))
-        for file in files:
-            try:
-                table = opened(file).read(list(wanted))
-            except (ArrowException, OSError) as error:
-                raise UnreadableFileError(file, f'no Parquet file ({_first_line(error)})'
-                                          ) from None
-            parts.append({name: _plain(table[name].to_numpy()) for name in table.column_names})
-        try:
-            return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
-        except (KeyError, ValueError):
-            raise UnreadableFileError(path, 'its Parquet files do not hold the same columns'
-                                      ) from None
+        with _readable(path, 'Parquet'):
+            opened = [ParquetFile(file) for file in files]
+            require_size(path, sum(_parquet_size(file, wanted) for file in opened))
+            tables = [file.read(list(wanted)) for file in opened]
+            return {name: np.concatenate([_plain(table[name].to_numpy()) for table in tables])
+                    for name in wanted}
 
-    return ArrayTable(path, names_of(files[0]), load, labels)
+    with _readable(path, 'Parquet'):
+        names = list(ParquetFile(files[0]).schema_arrow.names)
+    return ArrayTable(path, names, load, labels)
 
 
 def _parquet_size(file: Any, wanted: Sequence[str]) -> int:
@@ -160,24 +241,11 @@ def _plain(values: Any) -> Any:
     return values
 
 
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0][:120]
-
-
 def _mat(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
-    try:
-        require_size(path, _mat_size(path))
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except UnreadableFileError:
-        raise
-    except NotImplementedError:
-        raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
-                                  ) from None
-    except (MatReadError, MemoryError, ValueError, TypeError, OSError, IndexError) as error:
-        raise UnreadableFileError(path, f'no MAT file ({_first_line(error)})') from None
+    require_size(path, _mat_size(path))
+    content = loadmat(path, squeeze_me=True, struct_as_record=False)
     return dict(_fields({name: value for name, value in content.items()
                          if not name.startswith('__')}))
 
@@ -206,29 +274,23 @@ def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
 
 
 def _numpy(path: Path) -> dict[str, Any]:
-    try:
-        with ZipFile(path) as archive:
-            require_size(path, sum(one.file_size for one in archive.infolist()))
-        with np.load(path, allow_pickle=False) as content:
-            return {name: content[name] for name in content.files}
-    except UnreadableFileError:
-        raise
-    except Exception as error:  # a damaged archive surfaces as zipfile's and zlib's own errors
-        raise UnreadableFileError(path, f'no NumPy file of arrays ({_first_line(error)})'
-                                  ) from None
+    if path.suffix == '.npy':
+        require_size(path, path.stat().st_size)
+        return {MATRIX: np.load(path, allow_pickle=False)}
+    with ZipFile(path) as archive:
+        require_size(path, sum(one.file_size for one in archive.infolist()))
+    with np.load(path, allow_pickle=False) as content:
+        return {name: content[name] for name in content.files}
 
 
 def _json(path: Path) -> dict[str, Any]:
     """Return the largest table within a JSON document, or one of a document in each line."""
     require_size(path, BYTES_PER_CHARACTER * path.stat().st_size)
+    text = path.read_text(encoding='utf-8')
     try:
-        text = path.read_text(encoding='utf-8')
-        try:
-            content = json.loads(text)
-        except ValueError:
-            content = [json.loads(line) for line in text.splitlines() if line.strip()]
-    except (ValueError, RecursionError) as error:
-        raise UnreadableFileError(path, f'no JSON ({_first_line(error)})') from None
+        content = json.loads(text)
+    except ValueError:
+        content = [json.loads(line) for line in text.splitlines() if line.strip()]
     table = _largest_table(content, DEEPEST)
     if not table:
         raise UnreadableFileError(path, 'it holds no table: a list of objects, or lists of numbers '

@@ -15,6 +15,7 @@ import gzip
 import os
 import re
 import zlib
+from codecs import getincrementaldecoder
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples
+from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples, Series
 from pprs_dynamics.system.csv_tables import write_table
 from pprs_dynamics.system.numbers import parse_number
 from pprs_dynamics.system.plain_text import counted
@@ -43,7 +44,9 @@ LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
 NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
 PREAMBLE = 20  # lines that may stand above a table
-NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8'
+NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text'
+CONTROLS = re.compile(rb'[\x00-\x08\x0e-\x1f]')  # in no text
+BEGINNING = 1 << 16  # bytes by which the encoding is recognised
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,8 @@ class CsvTable:
         Lines above the first row.
     sample : list of str
         Cells of the first row; empty where there is none.
+    heads : frozenset of str
+        Lines of the header, which may come again where logs were joined.
     """
 
     path: Path
@@ -73,6 +78,7 @@ class CsvTable:
     count: int
     above: int
     sample: list[str]
+    heads: frozenset[str] = frozenset()
 
     @classmethod
     def open(cls, path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> CsvTable:
@@ -92,8 +98,6 @@ class CsvTable:
             lines = list(islice(file, PREAMBLE))
         if not lines:
             raise UnreadableFileError(path, 'the file is empty')
-        if '\x00' in lines[0]:
-            raise UnreadableFileError(path, NO_TEXT)
         tables = [cls._with(path, lines, separator, decimal)
                   for separator in (*SEPARATORS, BLANK) if separator != decimal]
         most = max(table.count for table in tables[:-1])
@@ -127,7 +131,13 @@ class CsvTable:
         count = len(sample if sample and is_row(first) else rows[remarks])
         titles = [row for row in rows[max(first - 2, 0):first] if len(row) == count and any(row)]
         names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
-        return cls(path, separator, decimal, names, count, first, sample)
+        heads = frozenset(lines[max(first - 2, 0):first]) if names else frozenset()
+        return cls(path, separator, decimal, names, count, first, sample, heads)
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the first row holds numbers and dates."""
+        return any(self.sample) and all(_is_value(cell, self.decimal) for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.
@@ -137,7 +147,11 @@ class CsvTable:
         UnreadableFileError
             If a column is missing, a row has another count of cells, or a cell is no number.
         """
-        used = [self._place(column) for column in wanted]
+        used = [place for column in wanted if (place := self.place(column)) is not None]
+        if len(used) < len(wanted):
+            missing = next(column for column in wanted if self.place(column) is None)
+            raise UnreadableFileError(self.path, f'no column {missing}; it holds '
+                                      f'{counted(self.count, "column")}')
         dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
@@ -156,8 +170,8 @@ class CsvTable:
             raise UnreadableFileError(self.path, 'no samples below the header')
         return list(np.concatenate(blocks).T)
 
-    def head(self, most: int) -> list[Array]:
-        """Return the first rows of all columns, NaN for what is no number; broken rows left out."""
+    def series(self, most: int) -> Iterator[Series]:
+        """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
         found: list[list[float]] = []
         with _text_of(self.path) as (file, _):
             for _ in range(self.above):
@@ -168,7 +182,10 @@ class CsvTable:
                     found.append([self._any(cell) for cell in cells])
         if not found:
             raise UnreadableFileError(self.path, 'no samples below the header')
-        return list(np.array(found).T)
+        for k, values in enumerate(np.array(found).T):
+            if np.isfinite(values).any():
+                name = self.names[k] if self.names else ''
+                yield Series(name or k + 1, name, values)
 
     def _any(self, cell: str) -> float:
         try:
@@ -177,13 +194,11 @@ class CsvTable:
         except ValueError:
             return float('nan')
 
-    def _place(self, column: Column) -> int:
+    def place(self, column: Column) -> int | None:
+        """Return the place of a column from 0; None where there is none."""
         if isinstance(column, int):
-            if column > self.count:
-                raise UnreadableFileError(self.path, f'no column {column}; it holds '
-                                          f'{counted(self.count, "column")}')
-            return column - 1
-        return self.names.index(column)
+            return column - 1 if column <= self.count else None
+        return self.names.index(column) if column in self.names else None
 
     def title(self, place: int) -> str:
         """Return what a column is called."""
@@ -194,7 +209,8 @@ class CsvTable:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
 
-        numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
+        numbered = [(number, line) for number, line in enumerate(lines, start)
+                    if line.strip() and line not in self.heads]
         # pandas fills short rows, and takes a quote without its pair for the beginning of a cell.
         for number, line in numbered:
             count = (len(line.split()) if self.separator == BLANK else
@@ -291,7 +307,7 @@ def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
     damages = (EOFError, zlib.error, *([zstd().ZstdError] if path.suffix in ZSTANDARD else []))
     try:
         with (path.open('rb') as raw, _unpacked(path, raw) as content,
-              TextIOWrapper(content, encoding='utf-8-sig') as file):
+              TextIOWrapper(content, encoding=_encoding(path, content)) as file):
             yield file, raw
     except UnreadableFileError:
         raise
@@ -301,6 +317,21 @@ def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
         raise UnreadableFileError(path, NO_TEXT) from None
     except OSError as error:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
+
+
+def _encoding(path: Path, content: IO[bytes]) -> str:
+    """Return how a text is encoded: UTF-8, UTF-16 with its mark, or as Windows does in Europe."""
+    start = content.read(BEGINNING)
+    content.seek(0)
+    if start.startswith((b'\xff\xfe', b'\xfe\xff')):
+        return 'utf-16'
+    if CONTROLS.search(start):
+        raise UnreadableFileError(path, NO_TEXT)
+    try:
+        getincrementaldecoder('utf-8')().decode(start)
+    except UnicodeDecodeError:
+        return 'cp1252'
+    return 'utf-8-sig'
 
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:

@@ -50,7 +50,7 @@ class Judgement:
     samples : Samples
         The remaining samples.
     segments : tuple of slice
-        Stretches without reset, jump, gap or change of rate, of at least 20 samples.
+        Stretches without reset, jump or gap, of at least 20 samples.
     findings : list of Defect
     """
 
@@ -182,14 +182,6 @@ class Judgement:
 
     def _judge_spacing(self) -> None:
         time = self.samples.time
-        changes = stamps.rate_changes(time, self._starts)
-        if changes:
-            _, before, after = changes[0]
-            self._tell('changing_rate', len(changes),
-                       f'the rate changes {counted(len(changes), "time")}, first from '
-                       f'{1 / before:.4g} Hz to {1 / after:.4g} Hz,',
-                       [(first, first) for first, _, _ in changes])
-        self._split(np.array([first for first, _, _ in changes], dtype=np.int64))
         gaps, losses, counts = zip(*(stamps.gaps(time, part) for part in stamps.stretches(
             self._starts, len(time))), strict=True)
         gap, lost, lost_count = np.concatenate(gaps), np.concatenate(losses), sum(counts)
@@ -282,7 +274,7 @@ class Judgement:
 
     def _judge_constant_values(self) -> None:
         samples = self.samples
-        runs = signals.frozen_runs(samples, self._starts)
+        runs = signals.frozen_runs(samples)
         count = sum(last - first for first, last in runs)
         self._tell('frozen_samples', count,
                    f'{counted(count, "sample")} repeating every value of the one before', runs)
@@ -304,7 +296,7 @@ class Judgement:
                            f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} '
                            f'{samples.unit_of(drive, "N")} throughout', drives=[name])
                 continue
-            runs = signals.stuck_efforts(samples, self._starts, drive)
+            runs = signals.stuck_efforts(samples, drive)
             self._tell('constant_effort', len(runs),
                        f'the effort of {name} does not change while it moves', runs, [name])
 

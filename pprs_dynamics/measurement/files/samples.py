@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import CHANNELS, DriveUnits
+from pprs_dynamics.drives import CHANNELS, Column, DriveUnits
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -51,7 +51,6 @@ POLICY = {
     'duplicate_stamps': 'the first sample of each stamp is kept',
     'position_spike': 'those samples are dropped',
     'position_jump': 'the recording is split there',
-    'changing_rate': 'the recording is split there',
     'gap': 'the recording is split there',
     'lost_samples': 'they stay within one segment, to be interpolated',
     'irregular_steps': 'the stamps are taken as true',
@@ -190,6 +189,25 @@ class Samples:
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""
         return self.units[drive].of(unit) if self.units else unit
+
+
+@dataclass(frozen=True)
+class Series:
+    """One column of a table, or one element of messages that are arrays.
+
+    Parameters
+    ----------
+    column : str or int
+        As a model file names it.
+    title : str
+        What it is called, for people; empty where it has no name.
+    values : (n,) array
+        Its first numbers.
+    """
+
+    column: Column
+    title: str
+    values: Array
 
 
 def whole_epoch(seconds: Array) -> int:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Order and spacing of stamps: resets, disorder, duplicates, rates, gaps, lost samples.
+"""Order and spacing of stamps: resets, disorder, duplicates, gaps, lost samples.
 
 Each function looks at times, (N,), within `starts`: the first samples of the stretches that are
 already known to be apart. Thresholds are relative to the stretch's own median step.
@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices, Mask
@@ -37,10 +36,9 @@ GAP_TIME = 0.02
 # Steps that are this much longer than the median in a twentieth of all vary by jitter: gaps are
 # longer than some of those.
 USUAL, JITTER, JITTER_STEPS = 0.95, 1.8, 2.5
-# Medians of this many steps are compared; a rate that lasts less than three of them, or differs
-# by less than this, has not changed.
-RATE_BLOCK = 100
-RATE_CHANGE = 0.2
+# Steps that are no whole number of medians, by this part of one, in a twentieth of all: no clock
+# sent samples that were lost.
+WHOLE = 0.25
 # Differences of stamps that are floats may be this much off, relatively.
 STAMP_ROUNDING = 1e-6
 # The middle 90 % of the steps spread over more than this part of the median: irregular.
@@ -98,36 +96,11 @@ def duplicates(time: Array) -> Mask:
     return np.concatenate(([False], np.diff(time) == 0))
 
 
-def rate_changes(time: Array, starts: Indices) -> list[tuple[int, float, float]]:
-    """Return (first sample of the new rate, median step before, after) [s]."""
-    changes = []
-    for part in stretches(starts, len(time)):
-        steps = np.diff(time[part])
-        blocks = len(steps) // RATE_BLOCK
-        if blocks < 3:
-            continue
-        medians = _smoothed(np.median(
-            steps[:blocks * RATE_BLOCK].reshape(blocks, RATE_BLOCK), axis=1))
-        level = float(medians[0])
-        for block in range(1, blocks):
-            new = float(medians[block])
-            if abs(np.log(new / level)) <= np.log1p(RATE_CHANGE):
-                continue
-            # The change lies near this block: where the most steps fit the rate of their side.
-            first = max(0, block - 3) * RATE_BLOCK
-            near = steps[first:(block + 3) * RATE_BLOCK]
-            fits_new = (np.abs(near - new) < np.abs(near - level)).astype(int)
-            score = np.cumsum(1 - 2 * fits_new)
-            changes.append((part.start + first + int(np.argmax(score)) + 1, level, new))
-            level = new
-    return changes
-
-
 def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     """Return the steps of a stretch that are gaps, those with lost samples, and how many lost.
 
     A step is named by its second sample. A long step that a short neighbour makes up for is a
-    late stamp, not a lost sample.
+    late stamp, not a lost sample, and of samples without a regular clock none is lost.
     """
     steps = np.diff(time[part])
     if len(steps) < 2:
@@ -136,30 +109,21 @@ def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     step = float(np.median(steps))
     longest = max(GAP_STEPS * step, GAP_TIME)
     usual = float(np.quantile(steps, USUAL))
-    if usual > JITTER * step:  # steps that vary much are no gaps
+    is_irregular = usual > JITTER * step
+    if is_irregular:  # steps that vary much are no gaps
         longest = max(longest, JITTER_STEPS * usual)
     gap = steps > longest * (1 + STAMP_ROUNDING)
+    # Damaged stamps may be as far off as numbers reach.
+    counts = np.minimum(steps, MOST_LOST * step) / step
+    is_irregular |= bool(np.quantile(np.abs(counts - np.rint(counts)), USUAL) > WHOLE)
     padded = np.concatenate(([step], steps, [step]))
     not_made_up = np.minimum(padded[:-2], padded[2:]) + steps > (LOST_STEPS + 1) * step
-    lost = (steps > LOST_STEPS * step) & not_made_up & ~gap
-    # Damaged stamps may be as far off as numbers reach.
-    count = int(np.sum(np.rint(np.minimum(steps[lost], MOST_LOST * step) / step) - 1))
-    return part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost), count
+    lost = (steps > LOST_STEPS * step) & not_made_up & ~gap & (not is_irregular)
+    return (part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost),
+            int(np.sum(np.rint(counts[lost]) - 1)))
 
 
 def spread(time: Array, part: slice) -> tuple[float, float, float]:
-    """Return the 5 %, 50 % and 95 % points of the steps of a stretch [s].
-
-    A step over lost samples counts by how much it differs from a whole number of steps.
-    """
-    steps = np.diff(time[part])
-    middle = float(np.median(steps))
-    whole = np.maximum(np.rint(steps / middle), 1)
-    low, high = np.quantile(steps - (whole - 1) * middle, (0.05, 0.95))
-    return float(low), middle, float(high)
-
-
-def _smoothed(medians: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the running median over five blocks, which a lasting change of three survives."""
-    padded = np.concatenate((medians[[0, 0]], medians, medians[[-1, -1]]))
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    """Return the 5 %, 50 % and 95 % points of the steps of a stretch [s]."""
+    low, middle, high = np.quantile(np.diff(time[part]), (0.05, 0.5, 0.95)).tolist()
+    return low, middle, high

@@ -20,7 +20,12 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, meant
-from pprs_dynamics.measurement.files.array_files import ArrayTable, open_arrays
+from pprs_dynamics.measurement.files.array_files import (
+    ELEMENT,
+    KINDS,
+    ArrayTable,
+    open_arrays,
+)
 from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.measurement.files.merged_states import at_stamps
 from pprs_dynamics.measurement.files.samples import (
@@ -37,13 +42,10 @@ from pprs_dynamics.system.plain_text import counted
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
 # What other programs call it.
-TIME_LIKE = ('t', 'stamp', 'timestamp', 'times', 'seconds', 'sec', 'clock', 'rostime', 'date',
-             'datetime')
-ELEMENT = re.compile(r'(.+)\[(\d+)\]')
+TIME_LIKE = ('t', 'ts', 'stamp', 'stamps', 'timestamp', 'timestamps', 'times', 'seconds', 'sec',
+             'clock', 'rostime', 'date', 'datum', 'datetime', 'zeit', 'uhrzeit')
 # From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
 LATEST_SECOND = 1e11
-KINDS = {'.mat': 'MAT', '.parquet': 'Parquet', '.pq': 'Parquet', '.npz': 'NumPy', '.json': 'JSON',
-         '.jsonl': 'JSON'}
 PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
 Table = CsvTable | ArrayTable
 
@@ -83,8 +85,8 @@ def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Ta
 
 def read_column(path: Path) -> Array:
     """Return the first column of a table without a header, (N,)."""
-    table = open_table(path)
-    return table.read([1])[0] if isinstance(table, CsvTable) else np.zeros(0)
+    column: Array = open_table(path).read([1])[0]
+    return column
 
 
 def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
@@ -93,7 +95,7 @@ def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic:
     time = _time_column(table, columns)
     chosen, prefix = _chosen(table, drives, columns, topic)
     wanted = list(dict.fromkeys([*([] if time is None else [time]), *chosen.values()]))
-    arrays = _read(table, wanted, time, progress)
+    arrays: dict[Column, Any] = dict(zip(wanted, table.read(wanted, progress), strict=True))
     seconds, epoch, told = _seconds(None if time is None else arrays[time], columns,
                                     len(arrays[wanted[-1]]))
     return Samples.of_columns(
@@ -186,7 +188,7 @@ def _require(table: Table, wanted: Sequence[Column]) -> None:
                 table.path, f'{len(places)} columns have the name {column!r}: '
                 + (f'write the number of the right one, {" or ".join(places)}'
                    if isinstance(table, CsvTable) else 'rename one of them'))
-        if not isinstance(column, int) and not _holder(table, column):
+        if not isinstance(column, int) and table.place(column) is None:
             if not table.names:
                 raise UnreadableFileError(
                     table.path, f'no column {column!r}: it has no header, so columns must be '
@@ -197,77 +199,12 @@ def _require(table: Table, wanted: Sequence[Column]) -> None:
                 + '; it holds ' + (', '.join(sorted(table.names)[:MOST]) or 'none'))
 
 
-def _holder(table: Table, column: str) -> tuple[str, int | None] | None:
-    """Return the name that a column is under, and which element of its lists it is."""
-    if column in table.names:
-        return column, None
-    element = ELEMENT.fullmatch(column)
-    return ((element[1], int(element[2]))
-            if element and isinstance(table, ArrayTable) and element[1] in table.names else None)
-
-
-def _read(table: Table, wanted: Sequence[Column], time: Column | None,
-          progress: Progress | None) -> dict[Column, Any]:
-    """Return columns, (N,) each."""
-    if isinstance(table, CsvTable):
-        return dict(zip(wanted, table.read(wanted, progress), strict=True))
-    places: dict[Column, tuple[str, int | None]] = {}
-    for column in wanted:
-        if isinstance(column, int):
-            raise UnreadableFileError(table.path, f'no column {column}: its columns have names, '
-                                      + ', '.join(sorted(table.names)[:MOST]))
-        places[column] = _holder(table, column) or (column, None)
-    loaded = table.load(list(dict.fromkeys(name for name, _ in places.values())))
-    length = None if time is None else np.asarray(loaded[places[time][0]]).size
-    arrays: dict[Column, Any] = {
-        column: _series(table.path, name, loaded[name], element, None if column == time else length)
-        for column, (name, element) in places.items()}
-    lengths = {len(values) for values in arrays.values()}
-    if len(lengths) > 1:
-        short = min(arrays, key=lambda name: len(arrays[name]))
-        raise UnreadableFileError(table.path, f'column {short!r} has {len(arrays[short])} rows, '
-                                  f'must have {max(lengths)}, as others')
-    return arrays
-
-
-def _series(path: Path, name: str, values: Any, element: int | None, length: int | None) -> Any:
-    """Return an array, or one element of each of its lists, as (N,)."""
-    array = np.asarray(values)
-    if not np.issubdtype(array.dtype, np.datetime64):
-        try:
-            if array.dtype.kind == 'c':
-                if np.any(array.imag):
-                    raise UnreadableFileError(path, f'column {name!r} holds complex numbers, must '
-                                              'hold real ones: take its real part')
-                array = array.real
-            array = array if array.dtype.kind in 'iu' else array.astype(float)
-        except (TypeError, ValueError):
-            raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
-                                      ) from None
-    array = np.squeeze(array) if array.size > 1 else array.ravel()
-    if array.ndim == 2 and (array.shape[0] != length if length else
-                            array.shape[0] < array.shape[1]):
-        array = array.T
-    if array.ndim == 1 and not element:
-        return array
-    if array.ndim != 2:
-        raise UnreadableFileError(path, f'column {name!r} has the shape {array.shape}, must hold '
-                                  'numbers, or lists of them')
-    count = array.shape[1]
-    if element is None or element >= count:
-        raise UnreadableFileError(path, f'column {name!r} holds lists of {count}, must be named '
-                                  f'{name}[0] to {name}[{count - 1}]')
-    return array[:, element]
-
-
 def _seconds(stamps: Any, columns: RecordedColumns, count: int,
              ) -> tuple[Array, int, tuple[Defect, ...]]:
     """Return times [s], whole seconds that they count from, and what was made of the stamps."""
     if stamps is None:
         assert columns.rate is not None
         return np.arange(count) / columns.rate, 0, ()
-    if np.issubdtype(stamps.dtype, np.datetime64):
-        stamps = stamps.astype('datetime64[ns]').astype(np.int64)
     scale = columns.time_scale
     told: tuple[Defect, ...] = ()
     if scale is None:
@@ -290,8 +227,9 @@ def _seconds(stamps: Any, columns: RecordedColumns, count: int,
 
 def _ignored(table: Table, wanted: Sequence[Column]) -> tuple[Defect, ...]:
     every = table.names or [str(k + 1) for k in range(getattr(table, 'count', 0))]
-    used = {every[one - 1] if isinstance(one, int) else (_holder(table, one) or (one,))[0]
-            for one in wanted}
+    places = [table.place(one) for one in wanted]
+    used = {every[place] if isinstance(place, int) else place[0]
+            for place in places if place is not None}
     others = [name or '(no name)' for name in every if name not in used]
     if not others:
         return ()
@@ -342,7 +280,7 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
         table = _opened(files['time'], columns)
         own: Column = columns.time if columns.time is not None else next(
             (name for name in TIME_COLUMNS if name in table.names), 1)
-        shared = next(iter(_read(table, [own], None, None).values()))
+        shared = table.read([own])[0]
     stamps: Array | None = None
     epoch = 0
     joints, arrays, told = drives.joints or drives.names, {}, []
@@ -358,8 +296,8 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
             read, series = {}, _in_turn(table, chosen)
         else:
             _require(table, list(chosen.values()))
-            read = _read(table, [*([] if time is None else [time]), *chosen.values()], time,
-                         progress)
+            wanted = [*([] if time is None else [time]), *chosen.values()]
+            read = dict(zip(wanted, table.read(wanted, progress), strict=True))
             series = {joint: read[column] for joint, column in chosen.items()}
         count = len(next(iter(series.values()), ()))
         if shared is not None and count != len(shared):

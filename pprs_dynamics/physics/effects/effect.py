@@ -10,7 +10,7 @@ import inspect
 import math
 import re
 from abc import ABC, ABCMeta, abstractmethod
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -350,16 +350,15 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     @abstractmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from its block in a model file, or raise ModelError.
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
+                  turning: Collection[str] | None = None) -> Self:
+        """Build the effect from its keys in a model file, or raise ModelError.
 
-        With `complete` false, values may be missing and the result only says that those given
-        are right: a node gets an effect's parameters one by one before it becomes active.
+        Keys are those below `effects.NAME.`, such as `lift_1.force`. With `complete` false, values
+        may be missing and the result only says that the given ones are right: a node gets the
+        parameters of an effect one by one before it becomes active. Drives in `turning` turn;
+        None allows the bounds of either kind.
         """
-
-    @abstractmethod
-    def to_file(self) -> dict[str, Any]:
-        """Return the block from which `from_file` makes this effect."""
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
@@ -386,9 +385,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         return frozenset({names})
 
     @classmethod
-    def _checked(cls, prefix: str, values: Any, complete: bool) -> dict[str, float]:
-        if not isinstance(values, Mapping):
-            raise ModelError(prefix, values, f'map {names(cls.parameters)} to numbers')
+    def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
+                 turns: bool | None = None) -> dict[str, Any]:
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
@@ -402,7 +400,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             value = values.get(name, parameter.default)
-            checked[name] = parameter.widest.check(f'{prefix}.{name}', value)
+            bounded = parameter.widest if turns is None else parameter.of(turns)
+            checked[name] = bounded.check(f'{prefix}.{name}', value)
         return checked
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Self
 
 from pprs_dynamics.arrays import Array
@@ -28,16 +28,10 @@ class StructureEffect(CatalogueEffect):
         self.values = dict(values)
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from `{parameter: value}`, or blocks of that by its places."""
-        given = flattened(values) if cls.is_of_one_place else values
-        return cls(cls._checked(f'effects.{cls.name}', given, complete))
-
-    def to_file(self) -> dict[str, Any]:
-        """Return `{parameter: value}`, or blocks of that of the places where it is."""
-        if not self.is_of_one_place:
-            return dict(self.values)
-        return nested({name: value for name, value in self.values.items() if value})
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
+                  turning: Collection[str] | None = None) -> Self:
+        """Build the effect from `{parameter: value}`."""
+        return cls(cls._checked(f'effects.{cls.name}', values, complete))
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:
@@ -88,28 +82,3 @@ class PassiveJointEffect(StructureEffect):
     @abstractmethod
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N, N m], (N, D)."""
-
-
-def flattened(values: Any) -> Any:
-    """Return `{name.parameter: value}` of blocks by name, one level deep."""
-    if not isinstance(values, Mapping):
-        return values
-    flat = {}
-    for name, block in values.items():
-        if isinstance(block, Mapping):
-            flat.update({f'{name}.{last}': value for last, value in block.items()})
-        else:
-            flat[name] = block
-    return flat
-
-
-def nested(values: Mapping[str, float]) -> dict[str, Any]:
-    """Return blocks by name of `{name.parameter: value}`; names without a dot stay."""
-    blocks: dict[str, Any] = {}
-    for key, value in values.items():
-        name, dot, last = key.rpartition('.')
-        if dot:
-            blocks.setdefault(name, {})[last] = value
-        else:
-            blocks[key] = value
-    return blocks

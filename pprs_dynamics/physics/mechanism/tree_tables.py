@@ -3,12 +3,17 @@
 
 """Tables of a tree of joints with closures: what it is, how it moves, and what it transmits.
 
-Row 0 of all tables of joints is the base.
+Row 0 of all tables of joints is the base. Tables are also packed as rows of numbers, because
+compiled code takes few arrays faster than many: shapes are stated once, by names of sizes. Space
+for a motion is a row per sample, or one row that every sample uses in turn.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,9 +39,47 @@ UNIT = 2  # column of `row_reals`
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 
 
-def _part(table: Array, of: int, at: int | slice) -> Array:
-    """Return a row, or some, of each group of `of` rows of vectors."""
-    return table.reshape(*table.shape[:-2], -1, of, 3)[..., at, :]
+# Columns of tables, and rows of tables of vectors, by the names under which they are read: table,
+# column; table, rows of each group, the first of these and their number.
+COLUMNS = {'parent': ('joints', PARENT), 'turns': ('joints', TURNS),
+           'coordinate': ('joints', COORDINATE), 'loop_a': ('closures', LOOP_A),
+           'loop_b': ('closures', LOOP_B), 'row_unit': ('row_reals', UNIT)}
+PARTS = {
+    # Of a joint: orientation and origin in its parent, and axis.
+    'place_R': ('frames', OF_FRAME, PLACE_R, 3), 'place_p': ('frames', OF_FRAME, PLACE_P, 1),
+    'axis': ('frames', OF_FRAME, AXIS, 1),
+    # Of a closure: frames A and B in their links.
+    'a_R': ('closure_frames', OF_CLOSURE, A_R, 3), 'a_p': ('closure_frames', OF_CLOSURE, A_P, 1),
+    'b_R': ('closure_frames', OF_CLOSURE, B_R, 3), 'b_p': ('closure_frames', OF_CLOSURE, B_P, 1),
+    # Of a joint's link: orientation, origin, axis, angular and linear velocity and acceleration.
+    'R': ('links', OF_LINK, R, 3), 'p': ('links', OF_LINK, P, 1), 'z': ('links', OF_LINK, Z, 1),
+    'w': ('links', OF_LINK, W, 1), 'u': ('links', OF_LINK, U, 1),
+    'wd': ('links', OF_LINK, WD, 1), 'ud': ('links', OF_LINK, UD, 1),
+    # Of a closure: orientation and origin of its frames A and B.
+    'A': ('loops', OF_CLOSURE, A_R, 3), 'pA': ('loops', OF_CLOSURE, A_P, 1),
+    'B': ('loops', OF_CLOSURE, B_R, 3), 'pB': ('loops', OF_CLOSURE, B_P, 1),
+    # What joints and closures transmit: force, and moment about the joint's origin.
+    'f': ('links', OF_FORCES, FORCE, 1), 'n': ('links', OF_FORCES, MOMENT, 1),
+    'F': ('loops', OF_FORCES, FORCE, 1)}
+
+
+def _read(tables: tuple[Any, ...], name: str) -> Any:
+    """Return a part of tables by its name: (..., k) of a column, else (..., k, 3), (..., k, 3, 3).
+
+    Raises
+    ------
+    AttributeError
+        For a name that they have not.
+    """
+    table, *place = COLUMNS.get(name) or PARTS.get(name) or ('',)
+    if table not in tables._fields:  # type: ignore[attr-defined]
+        raise AttributeError(f'{type(tables).__name__} has no {name}')
+    values = getattr(tables, table)
+    if len(place) == 1:
+        return values[..., place[0]]
+    of, first, rows = place
+    groups = values.reshape(*values.shape[:-2], -1, of, 3)
+    return groups[..., first, :] if rows == 1 else groups[..., first:first + rows, :]
 
 
 class Model(NamedTuple):
@@ -98,70 +141,8 @@ class Model(NamedTuple):
     row_reals: Array
     passive_unit: Array
 
-    @property
-    def parent(self) -> Integers:
-        """Parent of each joint, (J + 1,)."""
-        return self.joints[:, PARENT]
-
-    @property
-    def turns(self) -> Integers:
-        """Whether each joint turns, (J + 1,)."""
-        return self.joints[:, TURNS]
-
-    @property
-    def coordinate(self) -> Integers:
-        """Coordinate of each joint, (J + 1,)."""
-        return self.joints[:, COORDINATE]
-
-    @property
-    def place_R(self) -> Array:
-        """Orientation of each joint in its parent, (J + 1, 3, 3)."""
-        return _part(self.frames, OF_FRAME, slice(PLACE_R, PLACE_R + 3))
-
-    @property
-    def place_p(self) -> Array:
-        """Origin of each joint in its parent, (J + 1, 3)."""
-        return _part(self.frames, OF_FRAME, PLACE_P)
-
-    @property
-    def axis(self) -> Array:
-        """Axis of each joint, (J + 1, 3)."""
-        return _part(self.frames, OF_FRAME, AXIS)
-
-    @property
-    def loop_a(self) -> Integers:
-        """Joints whose links are A of each closure, (L,)."""
-        return self.closures[:, LOOP_A]
-
-    @property
-    def loop_b(self) -> Integers:
-        """Joints whose links are B of each closure, (L,)."""
-        return self.closures[:, LOOP_B]
-
-    @property
-    def a_R(self) -> Array:
-        """Orientation of the frames A in their links, (L, 3, 3)."""
-        return _part(self.closure_frames, OF_CLOSURE, slice(A_R, A_R + 3))
-
-    @property
-    def a_p(self) -> Array:
-        """Origins of the frames A in their links, (L, 3)."""
-        return _part(self.closure_frames, OF_CLOSURE, A_P)
-
-    @property
-    def b_R(self) -> Array:
-        """Orientation of the frames B in their links, (L, 3, 3)."""
-        return _part(self.closure_frames, OF_CLOSURE, slice(B_R, B_R + 3))
-
-    @property
-    def b_p(self) -> Array:
-        """Origins of the frames B in their links, (L, 3)."""
-        return _part(self.closure_frames, OF_CLOSURE, B_P)
-
-    @property
-    def row_unit(self) -> Array:
-        """Units of the rows, (r,)."""
-        return self.row_reals[:, UNIT]
+    def __getattr__(self, name: str) -> Any:
+        return _read(self, name)
 
 
 class Data(NamedTuple):
@@ -199,60 +180,8 @@ class Data(NamedTuple):
     by_drives: Any
     residuals: Any
 
-    @property
-    def R(self) -> Any:
-        """Orientation of each joint's link, (N, J + 1, 3, 3)."""
-        return _part(self.links, OF_LINK, slice(R, R + 3))
-
-    @property
-    def p(self) -> Any:
-        """Its origin, (N, J + 1, 3)."""
-        return _part(self.links, OF_LINK, P)
-
-    @property
-    def z(self) -> Any:
-        """Axis of each joint."""
-        return _part(self.links, OF_LINK, Z)
-
-    @property
-    def w(self) -> Any:
-        """Angular velocity of its link."""
-        return _part(self.links, OF_LINK, W)
-
-    @property
-    def u(self) -> Any:
-        """Velocity of its origin."""
-        return _part(self.links, OF_LINK, U)
-
-    @property
-    def wd(self) -> Any:
-        """Angular acceleration of its link."""
-        return _part(self.links, OF_LINK, WD)
-
-    @property
-    def ud(self) -> Any:
-        """Acceleration of its origin."""
-        return _part(self.links, OF_LINK, UD)
-
-    @property
-    def A(self) -> Any:
-        """Orientation of the closures' frames A, (N, L, 3, 3)."""
-        return _part(self.loops, OF_CLOSURE, slice(A_R, A_R + 3))
-
-    @property
-    def pA(self) -> Any:
-        """Their origins, (N, L, 3)."""
-        return _part(self.loops, OF_CLOSURE, A_P)
-
-    @property
-    def B(self) -> Any:
-        """Orientation of the closures' frames B."""
-        return _part(self.loops, OF_CLOSURE, slice(B_R, B_R + 3))
-
-    @property
-    def pB(self) -> Any:
-        """Their origins."""
-        return _part(self.loops, OF_CLOSURE, B_P)
+    def __getattr__(self, name: str) -> Any:
+        return _read(self, name)
 
 
 class Loads(NamedTuple):
@@ -276,20 +205,8 @@ class Loads(NamedTuple):
     tau_friction: Any
     efforts: Any
 
-    @property
-    def f(self) -> Any:
-        """Forces that joints transmit, (N, J + 1, 3)."""
-        return _part(self.links, OF_FORCES, FORCE)
-
-    @property
-    def n(self) -> Any:
-        """Moments that joints transmit about their origins."""
-        return _part(self.links, OF_FORCES, MOMENT)
-
-    @property
-    def F(self) -> Any:
-        """Forces in the closures, (N, L, 3)."""
-        return _part(self.loops, OF_FORCES, FORCE)
+    def __getattr__(self, name: str) -> Any:
+        return _read(self, name)
 
 
 class JointFriction(NamedTuple):
@@ -314,3 +231,122 @@ class JointFriction(NamedTuple):
 # Rows of the parameters of drives, and of the efforts that follow from them.
 ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+
+
+class Sizes(NamedTuple):
+    """Numbers of rows of the tables, and of the columns of some."""
+
+    frames: int
+    joints: int
+    coordinates: int
+    drives: int
+    passive: int
+    loops: int
+    closure_frames: int
+    rows: int
+    path: int
+    starts: int
+    swap: int
+    below: int
+    right: int
+    links: int
+    forces: int
+    loop_forces: int
+    solved: int
+
+    @classmethod
+    def of(cls, t: Model) -> Sizes:
+        """Return those of tables."""
+        joints, loops = len(t.joints), len(t.closures)
+        return cls(len(t.frames), joints, len(t.places), len(t.drives), len(t.passive), loops,
+                   len(t.closure_frames), len(t.rows), len(t.path), len(t.starts), len(t.swap),
+                   len(t.below), len(t.right), OF_LINK * joints, OF_FORCES * joints,
+                   OF_FORCES * loops, len(t.passive) + len(t.drives))
+
+
+SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
+    Model: {
+        'joints': ('joints', 3), 'passive': ('passive',), 'drives': ('drives',),
+        'places': ('coordinates', 2), 'closures': ('loops', 4), 'rows': ('rows', 6),
+        'path': ('path', 2), 'starts': ('starts', 3), 'swap': ('swap',), 'below': ('below',),
+        'right': ('right',), 'frames': ('frames', 3), 'ratio': ('joints',),
+        'offset': ('joints',), 'stride': ('drives',), 'closure_frames': ('closure_frames', 3),
+        'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
+    Data: {
+        'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
+        'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
+        'inverse': ('passive', 'solved'), 'solution': (4,), 'J': ('passive', 'passive'),
+        'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
+    Loads: {
+        'links': ('forces', 3), 'loops': ('loop_forces', 3), 'tau': ('coordinates',),
+        'tau_friction': ('coordinates',), 'efforts': ('drives',)}}
+FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
+N = TypeVar('N', bound=tuple[Any, ...])
+
+
+class PackedTables(NamedTuple):
+    """Tables as rows of numbers: their sizes, whole numbers, and others."""
+
+    sizes: Integers
+    integers: Integers
+    reals: Array
+
+
+def packed_tables(t: Model) -> PackedTables:
+    """Return tables as rows of numbers."""
+    sizes = np.array(Sizes.of(t), dtype=np.int64)
+    first = Model._fields.index(FIRST_OF_REALS)
+    return PackedTables(sizes, np.concatenate([np.ravel(values) for values in t[:first]]),
+                        np.concatenate([np.ravel(values) for values in t[first:]]))
+
+
+def length_of(kind: type, sizes: Integers) -> int:
+    """Return how many numbers a row of a named tuple has."""
+    by_name = dict(zip(Sizes._fields, sizes.tolist(), strict=True))
+    return sum(math.prod(by_name[n] if isinstance(n, str) else n for n in shape)
+               for shape in SHAPES[kind].values())
+
+
+def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
+    """Return what rows (N, K) hold by name, the samples first."""
+    return kind(*(table[:, start:end].reshape(len(table), *shape) for start, end, shape in _places(
+        kind, tuple(sizes.tolist()))))
+
+
+@cache
+def _places(kind: type, sizes: tuple[int, ...]) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
+    by_name = dict(zip(Sizes._fields, sizes, strict=True))
+    found, start = [], 0
+    for shape in SHAPES[kind].values():
+        numbers = tuple(by_name[n] if isinstance(n, str) else n for n in shape)
+        found.append((start, start + math.prod(numbers), numbers))
+        start += math.prod(numbers)
+    return tuple(found)
+
+
+def _reader(kind: type) -> Callable[..., Any]:
+    """Return a function that makes a named tuple of views of a row, for compiled code.
+
+    Its source is written out: Numba makes named tuples only where all their elements are.
+    """
+    lines = ['def read(sizes, row, more):', '    at = 0', *(
+        f'    {name} = sizes[{k}]' for k, name in enumerate(Sizes._fields))]
+    for name, shape in SHAPES[kind].items():
+        if name == FIRST_OF_REALS:
+            lines.append('    at = 0')
+        source = 'more' if kind is Model and _is_real(name) else 'row'
+        count = ' * '.join(map(str, shape))
+        reshaped = f'.reshape(({", ".join(map(str, shape))}))' if len(shape) > 1 else ''
+        lines += [f'    of_{name} = {source}[at:at + {count}]{reshaped}', f'    at += {count}']
+    lines.append(f'    return Kind({", ".join(f"of_{name}" for name in SHAPES[kind])})')
+    namespace: dict[str, Any] = {'Kind': kind, '__name__': __name__}
+    exec('\n'.join(lines), namespace)
+    read: Callable[..., Any] = namespace['read']
+    return read
+
+
+def _is_real(name: str) -> bool:
+    return Model._fields.index(name) >= Model._fields.index(FIRST_OF_REALS)
+
+
+read_tables, read_motion, read_loads = (_reader(kind) for kind in (Model, Data, Loads))

@@ -140,7 +140,7 @@ class DriveModel:
             for effect in effects:
                 if isinstance(effect, BodyEffect):
                     loaded = effect.changed(loaded)
-                    loaded.require_bodies(f'effects.{effect.name}', effect.to_file())
+                    loaded.require_bodies(f'effects.{effect.name}', effect.values)
             return cls(robot=robot, effects=effects, reversal=reversal, limits=limits,
                        values=values, source=source)
 
@@ -160,11 +160,6 @@ class DriveModel:
     def moves_joints(self) -> bool:
         """Whether it is commanded by the motion of its joints; else by that of a platform."""
         return JointMotion in self.robot.motions
-
-    @property
-    def takes_long(self) -> bool:
-        """Whether forces take so long that several are evaluated in threads."""
-        return self.robot.structure is not None
 
     @cached_property
     def keys(self) -> dict[str, Key]:
@@ -187,20 +182,9 @@ class DriveModel:
         return tuple(DriveUnits(name in self.robot.turning) for name in self.drives)
 
     @property
-    def content(self) -> str:
-        """Hash of the description; '' without one."""
-        return '' if self.robot.structure is None else self.robot.structure.description.digest
-
-    @property
     def gain(self) -> tuple[float, ...] | None:
         """Effort per ampere of each drive [N m/A, N/A]; None for a model without."""
         return self.values.get(GAIN)
-
-    @property
-    def moved_mass(self) -> float:
-        """Mass of what carries a load, or of all links [kg]."""
-        mass: float = self.robot.moved_mass
-        return mass
 
     @property
     def gear_ratios(self) -> tuple[float, ...]:
@@ -209,20 +193,10 @@ class DriveModel:
         return ratios
 
     @property
-    def strokes(self) -> tuple[Array, Array]:
-        """Lowest and highest position of each drive [m, rad], (D,) each; may be infinite."""
-        return self.limits.strokes
-
-    @property
     def speed_limits(self) -> Array:
         """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
         structure = self.robot.structure
         return np.full(len(self.drives), np.inf) if structure is None else structure.speed
-
-    @property
-    def effort_limits(self) -> Array:
-        """Largest absolute effort that each drive can apply [N, N m], (D,); may be infinite."""
-        return self.limits.efforts
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -278,7 +252,7 @@ class DriveModel:
         return RecordedDrives(
             self.drives, joint_names(self.values, self.drives),
             recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
-            self.units, tuple(self.effort_limits.tolist()),
+            self.units, tuple(self.limits.efforts.tolist()),
             next((EFFORT_UNITS[value] for key, value in self.values.items()
                   if key.endswith('.effort_unit')), 1.0))
 
@@ -288,8 +262,9 @@ class DriveModel:
         # A node has no ledger, and an empty list where a file says nothing.
         values = {key: value for key, value in self.values.items()
                   if value not in ([], ()) and not key.startswith('history.')}
-        if self.content:  # the same wherever the files lie
-            values.update({key: self.content for key in FILES if values.get(key)})
+        if self.robot.structure is not None:  # the same wherever the files are
+            content = self.robot.structure.description.digest
+            values.update({key: content for key in FILES if values.get(key)})
         text = json.dumps(values, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -510,7 +485,7 @@ class DriveModel:
         state = self.initial_state() if state is None else state
         for effect in sensors:
             memory = state.memories[effect.name]
-            after = (effect.seen(total, mechanism, memory)
+            after = (effect.measured(total, mechanism, memory)
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after

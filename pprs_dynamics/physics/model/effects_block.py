@@ -30,19 +30,25 @@ def added_effects(
     for name in active:
         if find_effect(name) is None:
             raise _unknown(name, 'effects.active')
-    blocks = _nested('effects', {key: value for key, value in parameters.items()
-                                 if key.startswith('effects.') and key not in LISTS})
+    blocks: dict[str, dict[str, Any]] = {}
+    for key, value in parameters.items():
+        block, _, rest = key.partition('.')
+        if block == 'effects' and key not in LISTS:
+            name, _, rest = rest.partition('.')
+            if rest:
+                blocks.setdefault(name, {})[rest] = value
+            elif value in (None, {}):
+                blocks.setdefault(name, {})
+            else:
+                raise ModelError(key, value, 'be a mapping of its parameters')
     of_sensors = _effects_of_sensors(parameters)
-    for name, block in blocks.items():
+    for name, values in blocks.items():
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
-        _check_place(name, block, found, robot.kind, robot.drives, title_of(parameters))
-        found = found.bound(robot)
+        _check_place(name, values, found, robot, title_of(parameters))
         # A block that is not active is checked all the same, but may still be incomplete.
-        if issubclass(found, DriveEffect):
-            found.check_bounds(block, robot.turning)
-        effect = found.from_file(block, complete=name in active)
+        effect = found.bound(robot).from_file(values, name in active, robot.turning)
         if name in active:
             if name in of_sensors:
                 effect.is_measurement = True
@@ -56,15 +62,14 @@ def _unknown(name: str, place: str) -> UnknownNameError:
     return UnknownNameError('effect', name, catalogue(), place)
 
 
-def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: str,
-                 drives: tuple[str, ...], title: str) -> None:
-    """Raise ModelError where an effect is not one of this kind of model, or on another drive."""
-    if kind not in effect.acts_in:
-        raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + title)
-    if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
-        for drive in block:
-            if drive not in drives:
-                raise UnknownNameError('drive', drive, drives, f'effects.{name}')
+def _check_place(name: str, values: Mapping[str, Any], effect: type[CatalogueEffect], robot: Any,
+                 title: str) -> None:
+    """Raise ModelError where an effect is not one of this kind of robot, or on another drive."""
+    if robot.kind not in effect.acts_in:
+        raise ModelError(f'effects.{name}', dict(values), 'be an effect that acts in ' + title)
+    for key in values if issubclass(effect, DriveEffect) else ():
+        if (drive := key.rpartition('.')[0] or key) not in robot.drives:
+            raise UnknownNameError('drive', drive, robot.drives, f'effects.{name}')
 
 
 def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
@@ -100,19 +105,3 @@ def _expected(target: str) -> tuple[float, float] | None:
     effect = find_effect(name) if last else None
     return next((p.expected for p in effect.parameters if p.name == last),
                 None) if effect is not None and hasattr(effect, 'parameters') else None
-
-
-def _nested(root: str, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tree below `root`; a name cannot be a value and a block at once."""
-    tree: dict[str, Any] = {}
-    for name, value in flat.items():
-        *folders, leaf = name.removeprefix(f'{root}.').split('.')
-        branch = tree
-        for folder in folders:
-            branch = branch.setdefault(folder, {})
-            if not isinstance(branch, dict):
-                raise ModelError(name, value, f'not stand below {folder}, which has a value')
-        if isinstance(branch.get(leaf), dict):
-            raise ModelError(name, value, 'not be a value: keys stand below it')
-        branch[leaf] = value
-    return tree

@@ -42,7 +42,7 @@ def margins(model: DriveModel, mechanism: Any) -> Margins:
     mechanism : MechanismState
         What `model.drive_forces` returned with the forces.
     """
-    lower, upper = model.strokes
+    lower, upper = model.limits.strokes
     position = mechanism.position
     with np.errstate(invalid='ignore'):  # no limit of a joint: infinity over infinity
         room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (

@@ -107,7 +107,7 @@ def reproduce(model: DriveModel) -> Reproduction:
         model.reversal, velocity=HARD_REVERSAL, rate=HARD_REVERSAL))
     hard = hard_model.mechanism(path.motion(time))
     return Reproduction(
-        time, mechanism.rigid_force, active, passive, mechanism.links.chains.rod_angle,
+        time, mechanism.rigid_force, active, passive, mechanism.links.rod_angle,
         tuple(_claims(hard, _effect(model, ActiveFriction), approaches)))
 
 
@@ -119,10 +119,9 @@ def _claims(
     first, second = (_where_defined(effect, state) for effect in approaches)
     friction = active + first
     share = 100 * _rms(friction) / _rms(Q + friction)
-    chains = state.links.chains
-    u = np.degrees(chains.rod_angle)
+    cos_u, u = state.links.cos_u, np.degrees(state.links.rod_angle)
     # A rod that leans down has a negative angle; upright is 90 degrees either way.
-    crossed = bool(np.any(chains.cos_u.min(axis=0) * chains.cos_u.max(axis=0) < 0))
+    crossed = bool(np.any(cos_u.min(axis=0) * cos_u.max(axis=0) < 0))
     near = _approach_at(approaches[1], state, 1e-3)
     a, p1, p2 = _rms(active), _rms(first), _rms(second)
     passive_share = float(np.max(p1 / _rms(Q + friction)))

@@ -13,8 +13,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.vectors import ChainVector
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
 
 LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
 SLIDE = 0.06  # length of a slide of the 3-PPRS, over its distance from the base's centre
@@ -77,14 +77,18 @@ class Skeleton:
 
 def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
     geometry, strokes = model.robot.geometry, model.values['limits.slide_stroke']
-    found = joint_positions(geometry, motion)
+    found, frames = model.robot.state(motion, model.reversal).links, geometry.frames
+    slide, lift = np.split(found.position, 2, axis=1)
+    R, l = np.full_like(slide, geometry.base_radius), geometry.rod_length  # noqa: E741
+    feet, elbows, tips = (frames.base(ChainVector(*point)) for point in (
+        (R, slide, 0 * lift), (R, slide, lift),
+        (R - l * found.cos_u, slide, lift + l * found.sin_u)))
     points: list[Array] = []
     lines: list[Line] = []
     joints: dict[str, int] = {}
     labels: dict[str, int] = {}
     for i in range(3):
-        foot, elbow, tip = found.foot[:, i], found.elbow[:, i], found.tip[:, i]
-        frames = geometry.frames
+        foot, elbow, tip = feet[:, i], elbows[:, i], tips[:, i]
         along = np.array([-frames.sin[i], frames.cos[i], 0.0])
         middle = geometry.base_radius * np.array([frames.cos[i], frames.sin[i], 0.0])
         half = SLIDE * geometry.base_radius * along

@@ -10,16 +10,15 @@ which the n_i add up to nothing, speaks of omega alone,
     m . omega = b,    m = sum of balance_i m_i,    b = sum of balance_i q_dot_i.
 
 With v_x and v_y put in, row i of the lifts says s_i v_z + g_i . omega = b_i, s_i = sin u_i. These
-four equations are solved by Cramer's rule; their determinant is a constant times det [B], so its
-sign distinguishes the assembly modes. There is no pivot to choose, and nothing is divided by
-but the determinant.
+four equations are solved by Cramer's rule; their determinant is a constant times det [B]. There is
+no pivot to choose, and nothing is divided by but the determinant.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -32,10 +31,8 @@ from pprs_dynamics.physics.mechanism.vectors import (
     times,
 )
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import read_chains, rod_direction
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import rod_direction
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
-
-INVERSE_COLUMNS = 36
 
 
 class Wrench(NamedTuple):
@@ -57,16 +54,6 @@ class DriveValues(NamedTuple):
 
     slides: tuple[Any, Any, Any]
     lifts: tuple[Any, Any, Any]
-
-
-class Inverse(NamedTuple):
-    """[B]^-1 by its columns, and a constant times det [B].
-
-    Column j is the twist for a unit right side j of Eq. (4).
-    """
-
-    columns: DriveValues
-    determinant: Value
 
 
 class ClosureRows(NamedTuple):
@@ -111,19 +98,10 @@ class Elimination(NamedTuple):
     w0: Vector
     z: tuple[Any, Any, Any]
     w: tuple[Vector, Vector, Vector]
-    determinant: Value
 
 
-def eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimination:
-    """Solve Eq. (4) for unit right sides; infinite or NaN where the determinant is 0.
-
-    Parameters
-    ----------
-    geometry : GeometryParameters
-    rows : three ClosureRows
-    rods : three ChainSample or alike
-        Of which `cos_u` and `sin_u` are taken.
-    """
+def _eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimination:
+    """Solve Eq. (4) for unit right sides."""
     k1, k2, k3 = geometry.chains
     m1, m2, m3 = rows[0].slide.moment, rows[1].slide.moment, rows[2].slide.moment
     along_x = combine(k1.left_x, m1, k2.left_x, m2, k3.left_x, m3)
@@ -133,15 +111,13 @@ def eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimi
     s1, s2, s3 = rods[0].sin_u, rods[1].sin_u, rods[2].sin_u
     g23, g31, g12 = product(g2, g3), product(g3, g1), product(g1, g2)
     G = combine(s1, g23, s2, g31, s3, g12)
-    determinant = dot(m, G)
-    share = 1.0 / determinant
+    share = 1.0 / dot(m, G)
     return Elimination(
         along_x, along_y, -share * dot(g1, g23), times(share, G),
         (share * dot(m, g23), share * dot(m, g31), share * dot(m, g12)),
         (product(m, _difference(share * s2, g3, share * s3, g2)),
          product(m, _difference(share * s3, g1, share * s1, g3)),
-         product(m, _difference(share * s1, g2, share * s2, g1))),
-        determinant)
+         product(m, _difference(share * s1, g2, share * s2, g1))))
 
 
 def _twist(
@@ -152,10 +128,19 @@ def _twist(
                         f0 * e.z0 + f1 * e.z[0] + f2 * e.z[1] + f3 * e.z[2]), omega)
 
 
-def invert(geometry: GeometryParameters, e: Elimination, rods: Any) -> Inverse:
-    """Return [B]^-1 and the determinant."""
-    return Inverse(DriveValues(_slide_columns(geometry, e, rods),
-                               _lift_columns(e)), e.determinant)
+def invert(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> DriveValues:
+    """Return [B]^-1 by its columns, the twists for unit right sides of Eq. (4).
+
+    Infinite or NaN where det [B] is 0.
+
+    Parameters
+    ----------
+    geometry : GeometryParameters
+    rows : three ClosureRows
+    rods : three ChainSample
+    """
+    e = _eliminate(geometry, rows, rods)
+    return DriveValues(_slide_columns(geometry, e, rods), _lift_columns(e))
 
 
 @each_chain
@@ -210,13 +195,13 @@ def square(twist: Twist, r: Any) -> Any:
     return dot(twist.v, twist.v) + r * r * dot(twist.omega, twist.omega)
 
 
-def condition_bound(inverse: Inverse, rows: ThreeRows, rods: Any, r: Any) -> Any:
+def condition_bound(inverse: DriveValues, rows: ThreeRows, rods: Any, r: Any) -> Any:
     """Return the square of the Frobenius condition number of [J], rotations times r."""
     n = 1.0 / r
     J, J_inverse = 0.0 * n, 0.0 * n
     for i in range(CHAINS):
         sine = rods[i].sin_u * rods[i].sin_u
-        J = J + square(inverse.columns.slides[i], r) + sine * square(inverse.columns.lifts[i], r)
+        J = J + square(inverse.slides[i], r) + sine * square(inverse.lifts[i], r)
         J_inverse = J_inverse + _size(rows[i].slide, n) + _size(rows[i].lift, n) / sine
     return J * J_inverse
 
@@ -224,50 +209,3 @@ def condition_bound(inverse: Inverse, rows: ThreeRows, rods: Any, r: Any) -> Any
 def _size(wrench: Wrench, n: Any) -> Any:
     # The force of a unit reaction has length 1.
     return 1.0 + n * n * dot(wrench.moment, wrench.moment)
-
-
-def write_inverse(table: Array, s: Sample, inverse: Inverse) -> None:
-    """Write [B]^-1 at sample s to a table, row after row."""
-    for i in range(CHAINS):
-        _write_column(table, s, i, inverse.columns.slides[i])
-        _write_column(table, s, CHAINS + i, inverse.columns.lifts[i])
-
-
-def _write_column(table: Array, s: Sample, j: int, twist: Twist) -> None:
-    v, omega = twist.v, twist.omega
-    table[s, j], table[s, 6 + j], table[s, 12 + j] = v.x, v.y, v.z
-    table[s, 18 + j], table[s, 24 + j], table[s, 30 + j] = omega.x, omega.y, omega.z
-
-
-def read_inverse(table: Array, s: Sample) -> Inverse:
-    """Return [B]^-1 at sample s of a table, without its determinant."""
-    return Inverse(DriveValues(_read_columns(0, table, s),
-                               _read_columns(CHAINS, table, s)), 0.0)
-
-
-@each_chain
-def _read_columns(i: int, first: int, table: Array, s: Sample) -> Twist:
-    j = first + i
-    return Twist(Vector(table[s, j], table[s, 6 + j], table[s, 12 + j]),
-                 Vector(table[s, 18 + j], table[s, 24 + j], table[s, 30 + j]))
-
-
-class InverseParameters(NamedTuple):
-    """Parameters of `inverse_kernel`: the bound is the square of the condition number allowed."""
-
-    geometry: GeometryParameters
-    bound: Value
-    platform_radius: Value
-
-
-def inverse_kernel(
-    p: InverseParameters, s: Sample, chains: Array, inverse: Array, bound: Array,
-) -> Any:
-    """Fill tables of [B]^-1 and of `condition_bound` from one of chains."""
-    rods = read_chains(chains, s)
-    rows = rows_of_chains(p.geometry, rods)
-    B_inverse = invert(p.geometry, eliminate(p.geometry, rows, rods), rods)
-    write_inverse(inverse, s, B_inverse)
-    found = condition_bound(B_inverse, rows, rods, p.platform_radius)
-    bound[s, 0] = found
-    return (found <= p.bound) & (B_inverse.determinant != 0.0)

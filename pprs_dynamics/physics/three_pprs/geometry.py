@@ -13,7 +13,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
 
@@ -62,17 +61,11 @@ class Geometry:
     elbow: str = 'up'
 
     def __post_init__(self) -> None:
-        for name in ('base_radius', 'platform_radius', 'rod_length'):
-            _require(f'geometry.{name}', getattr(self, name), getattr(self, name) > 0,
-                     'be greater than 0 m')
         for name in ('chain_angles', 'platform_angles'):
             angles = np.asarray(getattr(self, name), dtype=float)
-            _require(f'geometry.{name}', getattr(self, name), angles.shape == (3,),
-                     'hold three angles [rad]')
             distance = np.abs(np.exp(1j * angles) - np.exp(1j * np.roll(angles, 1)))
             _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
                      'hold three different directions')
-        _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
         turned = np.subtract(self.platform_angles, self.chain_angles)
         span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
         _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
@@ -90,7 +83,7 @@ class Geometry:
         return ChainFrames(self.chain_angles)
 
     @cached_property
-    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
+    def kernel_parameters(self) -> GeometryParameters:
         """Lengths and the constants of the chains."""
         frames, delta = self.frames, np.asarray(self.chain_angles)
         joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
@@ -100,8 +93,8 @@ class Geometry:
         constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
                              axis=1).tolist()
         first, second, third = (Chain(*chain) for chain in constants)
-        return KernelParameters(GeometryParameters(
-            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
+        return GeometryParameters(self.base_radius, self.rod_length, self.elbow_sign,
+                                  (first, second, third))
 
 
 @dataclass(frozen=True)
@@ -130,12 +123,6 @@ class Masses:
     inertia: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
-        for name, value in (('platform', self.platform), ('payload', self.payload)):
-            _require(f'masses.{name}', value, value >= 0, 'be at least 0 kg')
-        for name in ('slides', 'lifts', 'rods'):
-            value = getattr(self, name)
-            _require(f'masses.{name}', value, len(value) == 3 and min(value) >= 0,
-                     'hold three masses of at least 0 kg')
         _require('masses.platform', self.platform, self.total > 0,
                  'with masses.payload be greater than 0 kg')
         # A body's tensor has principal moments that satisfy the triangle inequality; a point

@@ -21,8 +21,9 @@ from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.three_pprs.joint_rates import relative_rate
+from pprs_dynamics.physics.mechanism.vectors import Vector, in_chain
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints
+from pprs_dynamics.physics.three_pprs.passive_joints import relative_rate
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class IndependentChainsFriction(PassiveFriction):
 
     def singular(self, state: MechanismState) -> np.ndarray:
         """Return the samples at which this approach is not defined, (N,) bool."""
-        mask: np.ndarray = np.any(np.abs(state.links.chains.cos_u) < self.minimum_cosine, axis=1)
+        mask: np.ndarray = np.any(np.abs(state.links.cos_u) < self.minimum_cosine, axis=1)
         return mask
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
@@ -119,19 +120,19 @@ class IndependentChainsFriction(PassiveFriction):
         singular = self.singular(state)
         if np.any(singular):
             sample = int(np.argmax(singular))
-            smallest = np.abs(state.links.chains.cos_u[sample])
+            smallest = np.abs(state.links.cos_u[sample])
             raise SingularityError(
                 sample, f'|cos u| of chain {int(np.argmin(smallest)) + 1} is '
                 f'{smallest.min():.3g}, where friction.approach independent_chains is unbounded',
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
-        chains = state.links.chains
-        k_r, k_s = np.hsplit(state.links.resistances(
-            state.reactions, self.joints(state.reversal)), 2)
-        omega_n = relative_rate(chains.u_dot, chains.angular_velocity)
-        lever = state.links.geometry.rod_length * chains.cos_u
+        found, geometry = state.reactions, state.reactions.robot.geometry
+        k_r, k_s = found.resistances(self.joints(state.reversal))
+        omega_n = relative_rate(found.u_dot, in_chain(geometry.frames, Vector(
+            *state.motion.angular_velocity.T[..., None])))
+        lever = geometry.rod_length * found.cos_u
         sign = -1.0 if self.printed else 1.0
         M_s_up, M_s_n = -k_s * omega_n.k, -k_s * omega_n.n                     # Eq. (9)
-        M_r_n = -k_r * chains.u_dot                                            # Eq. (9)
+        M_r_n = -k_r * found.u_dot                                            # Eq. (9)
         slides = sign * M_s_up / lever                                         # Eq. (13)
         lifts = sign * (M_s_n + M_r_n) / lever                                 # Eq. (13)
         return np.concatenate((slides, lifts), axis=1)

@@ -7,24 +7,42 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
-from pprs_dynamics.physics.mechanism.vectors import in_base, plus, times
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
+from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base, plus, times
+from pprs_dynamics.physics.three_pprs.chains import each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
     DriveValues,
-    Inverse,
     Wrench,
     power,
-    read_inverse,
     rod_row,
 )
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains, read_chains
-from pprs_dynamics.physics.three_pprs.joint_rates import Turnover, relative_rate, turnover
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters, Joints
+
+
+class Turnover(NamedTuple):
+    """sgn(s) / s in C_i and in A_i [s/rad]."""
+
+    revolute: Value
+    spherical: Value
+
+
+def relative_rate(u_dot: Value, omega: ChainVector) -> ChainVector:
+    """Return omega_n = u_dot_i n_i - omega, of the rod relative to the platform [rad/s]."""
+    return ChainVector(-omega.e, u_dot - omega.n, -omega.k)                    # Eq. (9)
+
+
+def length(v: ChainVector) -> Any:
+    """Return |v|."""
+    return sqrt(v.e * v.e + v.n * v.n + v.k * v.k)
+
+
+def turnover(u_dot: Value, omega: ChainVector, width: Value) -> Turnover:
+    """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
+    return Turnover(sign_over_speed(abs(u_dot), width),
+                    sign_over_speed(length(relative_rate(u_dot, omega)), width))
 
 
 class JointResistance(NamedTuple):
@@ -77,7 +95,7 @@ def chain_resistances(
 
 
 def friction_forces(
-    geometry: GeometryParameters, rods: ThreeChains, inverse: Inverse, k: Any, printed: Any,
+    geometry: GeometryParameters, rods: ThreeChains, inverse: DriveValues, k: Any, printed: Any,
 ) -> DriveValues:
     """Return the drive forces that overcome resistances k_ri, k_si of the chains: [J]^T w."""
     a, b, c = chain_resistances(geometry, rods, k, printed)
@@ -87,56 +105,10 @@ def friction_forces(
 
 
 @each_chain
-def _slide_forces(i: int, w: Wrench, inverse: Inverse) -> Any:
-    return power(w, inverse.columns.slides[i])                                 # Eq. (11)
+def _slide_forces(i: int, w: Wrench, inverse: DriveValues) -> Any:
+    return power(w, inverse.slides[i])                                 # Eq. (11)
 
 
 @each_chain
-def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
-    return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
-
-
-class FrictionParameters(NamedTuple):
-    """Parameters of `friction_kernel`."""
-
-    geometry: GeometryParameters
-    joints: Joints
-
-
-def friction_kernel(
-    p: FrictionParameters, s: Sample, chains: Array, inverse: Array, reactions: Array,
-    resistances: Array, force: Array,
-) -> Any:
-    """Fill tables of k_r, k_s and of the drive forces that overcome them."""
-    rods = read_chains(chains, s)
-    k = _resistances_at(p.joints, rods, reactions, s)
-    forces = friction_forces(p.geometry, rods, read_inverse(inverse, s), k, p.joints.printed)
-    for i in range(CHAINS):
-        resistances[s, i], resistances[s, CHAINS + i] = k[i].revolute, k[i].spherical
-        force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
-    return True
-
-
-@each_chain
-def _resistances_at(
-    i: int, joints: Joints, rods: ThreeChains, reactions: Any, s: Sample,
-) -> JointResistance:
-    return joint_resistances(
-        joints, reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i], reactions[s, 12 + i],
-        reactions[s, 15 + i], turnover(rods[i].u_dot, rods[i].omega, joints.width))
-
-
-def solve_friction(geometry: KernelParameters[GeometryParameters], joints: Joints, chains: Array,
-                   inverse: Array, reactions: Array) -> tuple[Array, Array]:
-    """Return k_r and k_s, (N, 6) [N m s/rad], and the drive forces that overcome them, (N, 6) [N].
-
-    Parameters
-    ----------
-    geometry, joints : parameters
-    chains, inverse, reactions : arrays
-        See `chain_table`, `inverse_table` and `RigidBody`.
-    """
-    k, force = np.empty((2, len(chains), 6))
-    evaluate(friction_kernel, geometry.extended(FrictionParameters, joints), chains, inverse,
-             reactions, k, force)
-    return k, force
+def _lift_forces(i: int, w: Wrench, inverse: DriveValues, rods: ThreeChains) -> Any:
+    return rods[i].sin_u * power(w, inverse.lifts[i])                  # Eq. (11)

@@ -10,24 +10,15 @@ A positive drive force is what the drive must apply along its positive coordinat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import (
     MotionSample,
-    motion_sample,
     turned,
     turned_back,
-    vector,
 )
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -39,69 +30,30 @@ from pprs_dynamics.physics.mechanism.vectors import (
 )
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
-    Inverse,
+    DriveValues,
     Wrench,
     power,
-    read_inverse,
     unit_wrench,
 )
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     ChainSample,
     ThreeChains,
-    read_chains,
     rod_normal,
 )
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
-    REVOLUTE,
     ChainMasses,
     PlatformBody,
     RobotParameters,
 )
 
 
-class Reactions(NamedTuple):
-    """Reactions of the spherical joints on the platform, and loads of the joints below.
-
-    All (N, 3) [N], chains last. H along n_i, V along the rod from C_i to A_i, W along w_i.
-    The starred ones are the same force one joint further down, in C_i: H_star along n_i,
-    V_star vertical, W_star radial (Eq. 9).
-    """
-
-    H: Array
-    V: Array
-    W: Array
-    H_star: Array
-    V_star: Array
-    W_star: Array
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """Frictionless drive forces and reactions.
-
-    Parameters
-    ----------
-    efforts : (N, 6) array
-        Q_i [N] in drive order.
-    guide_load : (N, 6) array
-        Normal force on the guide of every drive [N], the root in Eq. (15) and (16).
-    reaction_table : (N, 18) array
-        `reactions` as kernels take them.
-    """
-
-    efforts: Array
-    guide_load: Array
-    reaction_table: Array
-
-    @cached_property
-    def reactions(self) -> Reactions:
-        """Reactions of the spherical joints, and loads of the joints below."""
-        return Reactions(*(np.ascontiguousarray(self.reaction_table[:, column:column + 3])
-                           for column in range(0, 18, 3)))
-
-
 class ChainForces(NamedTuple):
-    """Forces in one chain at one sample, see `Reactions` and `RigidBody`."""
+    """Forces in one chain at one sample.
+
+    Reactions of the spherical joint on the platform: H along n_i, V along the rod from C_i to A_i,
+    W along w_i. The starred ones are the same force one joint further down, in C_i: H_star along
+    n_i, V_star vertical, W_star radial (Eq. 9). Then the drives' forces and their guides' loads.
+    """
 
     H: Value
     V: Value
@@ -203,7 +155,7 @@ ThreeForces = tuple[ChainForces, ChainForces, ChainForces]
 
 
 def body_forces(
-    p: RobotParameters, m: MotionSample, rods: ThreeChains, inverse: Inverse, load: Wrench,
+    p: RobotParameters, m: MotionSample, rods: ThreeChains, inverse: DriveValues, load: Wrench,
     hinges: Any, printed: Any,
 ) -> ThreeForces:
     """Return frictionless forces in the chains: the paper's four steps."""
@@ -222,68 +174,8 @@ def body_forces(
 @each_chain
 def _forces_of_chains(
     i: int, p: RobotParameters, rods: ThreeChains, specific: Any, W: Any, left: Wrench,
-    inverse: Inverse, printed: Any,
+    inverse: DriveValues, printed: Any,
 ) -> ChainForces:
-    H, V = power(left, inverse.columns.slides[i]), power(left, inverse.columns.lifts[i])  # Eq. (6)
+    H, V = power(left, inverse.slides[i]), power(left, inverse.lifts[i])  # Eq. (6)
     return chain_forces(p.masses[i], p.geometry.l, in_chain(p.geometry.chains[i], p.gravity),
                         rods[i], specific[i], H, V, W[i], printed)
-
-
-class BodyParameters(NamedTuple):
-    """Parameters of `body_kernel`: `printed` is 1 for Eq. (7) to the letter, else 0."""
-
-    robot: RobotParameters
-    printed: Value
-
-
-def body_kernel(
-    p: BodyParameters, s: Sample, motion: Array, chains: Array, inverse: Array, load: Array,
-    force: Array,
-    guide_load: Array, reactions: Array,
-) -> Any:
-    """Fill tables of forces, guide loads and reactions.
-
-    A load has nine columns, the platform's wrench and the moments in the hinges.
-    """
-    forces = body_forces(
-        p.robot, motion_sample(motion, s), read_chains(chains, s),
-        read_inverse(inverse, s), Wrench(vector(load, s, 0), vector(load, s, 3)),
-        vector(load, s, 6), p.printed)
-    for i in range(CHAINS):
-        f = forces[i]
-        force[s, i], force[s, 3 + i] = f.slide, f.lift
-        guide_load[s, i], guide_load[s, 3 + i] = f.slide_load, f.lift_load
-        reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i] = f.H, f.V, f.W
-        reactions[s, 9 + i], reactions[s, 12 + i] = f.H_star, f.V_star
-        reactions[s, 15 + i] = f.W_star
-    return True
-
-
-def solve_bodies(
-    robot: KernelParameters[RobotParameters], motion: PlatformMotion, chains: Array,
-    inverse: Array, printed: bool, load: StructureLoad | None,
-) -> RigidBody:
-    """Return frictionless drive forces, reactions and guide loads.
-
-    Parameters
-    ----------
-    robot : KernelParameters
-    motion : PlatformMotion
-    chains, inverse : arrays
-        See `chain_table` and `inverse_table`.
-    printed : bool
-        Take Eq. (7) to the letter, which lacks the factor l in its rod term.
-    load : StructureLoad, optional
-        Loads in addition to bodies and gravity.
-    """
-    samples = len(motion)
-    force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))
-    reactions = np.empty((samples, 18))
-    loads = np.zeros((samples, 9))
-    if load is not None:
-        loads[:, :6] = load.wrench
-        loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
-    parameters = robot.extended(BodyParameters, printed)
-    evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
-             reactions)
-    return RigidBody(force, guide_load, reactions)

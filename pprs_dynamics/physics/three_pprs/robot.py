@@ -6,28 +6,36 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
-from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
+from pprs_dynamics.errors import (
+    ConvergenceError,
+    ModelError,
+    SingularityError,
+    WorkspaceError,
+)
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
 from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
+from pprs_dynamics.physics.three_pprs import closed_form
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS, DriveFriction
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
     SPHERICAL,
@@ -36,9 +44,7 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.physics.three_pprs.kinematics import PlatformKinematics
-from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
-from pprs_dynamics.physics.three_pprs.tree import tree_structure
+from pprs_dynamics.physics.three_pprs.tree import structure_of, tree_structure
 
 RODS = 'rods'
 HOME_HEIGHT = 0.5  # [m], of the platform at home
@@ -67,6 +73,137 @@ class SingularityBounds(NamedTuple):
 
 
 UNBOUNDED = SingularityBounds()
+
+
+class ClosedForm:
+    """Kinematics, reactions and forces of a 3-PPRS at N samples, without friction of the drives.
+
+    Parameters
+    ----------
+    robot : ThreePprs
+    motion : PlatformMotion
+    load : StructureLoad, optional
+        In addition to bodies and gravity.
+    joints : Joints
+        Friction of the passive joints.
+    table : (closed_form.EVERYTHING, N, 6) array, optional
+        The results, where they are known.
+    """
+
+    def __init__(self, robot: ThreePprs, motion: PlatformMotion,
+                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS[0],
+                 table: Array | None = None) -> None:
+        self.robot, self.motion, self.load = robot, motion, load
+        self.is_regular = True
+        if table is None:
+            loads = closed_form.NO_LOAD
+            if load is not None:
+                loads = np.zeros((len(motion), 9))
+                loads[:, :6] = load.wrench
+                loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
+            table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+            self.is_regular = evaluate(
+                closed_form.forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
+                                       motion.rows, loads, table) < 0
+        self.table = table
+        self.position, self.velocity, self.acceleration = (
+            table[closed_form.POSITION:closed_form.ACCELERATION + 1])
+        self.efforts, self.guide_load = table[closed_form.RIGID], table[closed_form.GUIDE_LOAD]
+        self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
+        self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
+
+    @property
+    def rod_angle(self) -> Array:
+        """u_i [rad], (N, 3)."""
+        angle: Array = np.arctan2(self.sin_u, self.cos_u)
+        return angle
+
+    @property
+    def J(self) -> Array:
+        """[J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
+        J: Array = self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
+        return J
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Velocity of o and angular velocity of the platform, in `base`, (N, 6)."""
+        velocity: Array = self.motion.rows[:, 7:13]
+        return velocity
+
+    def joint_position(self, joint: str) -> Array:
+        """Return the angles u_i of the joints C_i, (N, 3) [rad]."""
+        assert joint == REVOLUTE
+        return self.rod_angle
+
+    def resistances(self, joints: Joints) -> Sequence[Array]:
+        """Return k_ri and k_si at the frictionless reactions, (N, 3) each, Eq. (9)."""
+        return np.split(self._with(joints).table[closed_form.RESISTANCE], 2, axis=1)
+
+    def friction(self, loads: ClosedForm, joints: Joints) -> Array:
+        """Return the drive forces against friction of passive joints, (N, 6) [N].
+
+        By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
+        """
+        found: Array = loads._with(joints).table[closed_form.PASSIVE]
+        return found
+
+    def _with(self, joints: Joints) -> ClosedForm:
+        return ClosedForm(self.robot, self.motion, self.load, joints)
+
+    def require_regular(self) -> None:
+        """Raise an error for poses out of reach, or nearer to a singularity than allowed.
+
+        Raises
+        ------
+        WorkspaceError
+            Where a rod is too short to reach: abs(R - A_i . e_i) > l.
+        SingularityError
+            Where a rod lies horizontally, the drives cannot hold the platform, or the drive
+            Jacobian is conditioned poorly.
+        """
+        geometry, bounds = self.robot.geometry, self.robot.bounds
+        beyond = ~(np.abs(self.cos_u) <= 1.0)
+        if np.any(beyond):
+            sample, chain = (int(i) for i in np.argwhere(beyond)[0])
+            raise WorkspaceError(
+                sample, f'the rod of chain {chain + 1} would have to span '
+                f'{abs(self.cos_u[sample, chain]) * geometry.rod_length:.6g} m radially',
+                f'its length is geometry.rod_length = {geometry.rod_length:g} m')
+        flat = np.abs(self.sin_u) < bounds.rod_sine
+        if np.any(flat):
+            sample, chain = (int(i) for i in np.argwhere(flat)[0])
+            raise SingularityError(
+                sample, f'|sin u| of chain {chain + 1} is {abs(self.sin_u[sample, chain]):.3g} '
+                '(its rod lies horizontally)',
+                f'it must be at least {bounds.rod_sine:g} (limits.rod_sine)')
+        singular = ~np.isfinite(self.J).all(axis=(1, 2))
+        if np.any(singular):
+            raise SingularityError(int(np.argmax(singular)), 'det [B] is 0',
+                                   'the drives cannot hold the platform here')
+        number = condition_number(geometry, self.J)
+        over = ~(number <= bounds.condition_number)
+        if np.any(over):
+            worst = int(np.argmax(over))
+            raise SingularityError(
+                worst, f'the condition number of the drive Jacobian is {number[worst]:.4g}',
+                f'limits.condition_number is {bounds.condition_number:g}')
+
+
+def condition_number(geometry: Geometry, J: Array) -> Array:
+    """Return the condition number of the drive Jacobian, (N,).
+
+    Rotations are multiplied by the platform's radius r as characteristic length, so that both
+    halves of a twist are in m/s.
+
+    References
+    ----------
+    J. Angeles, Fundamentals of Robotic Mechanical Systems, on the characteristic length.
+    """
+    r = geometry.platform_radius
+    singular = np.linalg.svd(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None], compute_uv=False)
+    with np.errstate(divide='ignore'):
+        number: Array = singular[:, 0] / singular[:, -1]
+    return number
 
 
 @dataclass(frozen=True)
@@ -168,8 +305,15 @@ class ThreePprs:
         body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
                             Vector(*masses.inertia[3:]))
         return KernelParameters(RobotParameters(
-            self.geometry.kernel_parameters.named, body, (first, second, third),
+            self.geometry.kernel_parameters, body, (first, second, third),
             Vector(*self.gravity)))
+
+    def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
+                   ) -> KernelParameters[closed_form.ForcesParameters]:
+        """Return the parameters of `forces_kernel` with friction of joints and drives."""
+        return self.kernel_parameters.extended(
+            closed_form.ForcesParameters, self.geometry.platform_radius, float(self.printed),
+            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives)
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
                      ) -> Mechanism:
@@ -181,19 +325,53 @@ class ThreePprs:
 
     # --- motion --------------------------------------------------------------------------------
 
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+    def motion_of_drives(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
                          closed: dict[Any, Array] | None = None) -> PlatformMotion:
-        """Return the platform's motion, by forward kinematics; see `solve_forward_motion`."""
-        return solve_forward_motion(self.geometry, position, velocity, acceleration, closed)
+        """Return the platform's motion that belongs to a continuous motion of the drives.
+
+        Six drive positions belong to several poses. The closures of the tree are followed from the
+        home pose, or from the last sample, and only poses are accepted whose determinant has the
+        sign that it has at home.
+
+        Parameters
+        ----------
+        position, velocity, acceleration : (N, 6) array_like
+            q [m], q_dot [m/s], q_ddot [m/s^2] in drive order.
+        closed : dict of Structure to array, optional
+            Coordinates at the last sample of another motion, from which this one goes on; brought
+            up to date.
+
+        Raises
+        ------
+        MotionError
+            For a wrong shape or a non-finite number.
+        ConvergenceError
+            Where no pose of the home pose's assembly mode is found.
+        ModelError
+            Where the geometry's home pose is itself singular.
+        """
+        q = checked_matrix('drive positions', position, COUNT)
+        structure, closed = structure_of(self.geometry), {} if closed is None else closed
+        try:
+            links = LinkMotion.of(structure, q, np.asarray(velocity), np.asarray(acceleration),
+                                  nearby=closed.get(structure))
+        except WorkspaceError as error:
+            raise ConvergenceError(
+                error.sample, f'no pose found for drive positions {q[error.sample].tolist()} m',
+                'they must close the mechanism in the assembly mode of the home pose') from None
+        m, (row, _) = links.motion, structure.links[structure.tool]
+        closed[structure] = m.q[-1].copy()
+        return PlatformMotion(m.p[:, row], _orientation(*(m.q[:, structure.coordinates.index(
+            f'platform.{angle}')] for angle in ('yaw', 'pitch', 'roll'))),
+            m.u[:, row], m.w[:, row], m.ud[:, row], m.wd[:, row])
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
     def state(self, motion: PlatformMotion, reversal: Reversal, friction: object = None,
-              closed: object = None, drive_motion: tuple[Array, Array, Array] | None = None,
-              ) -> MechanismState:
-        """Return the state for a platform motion, whose drive motion may be known already.
+              closed: object = None, found: ClosedForm | None = None) -> MechanismState:
+        """Return the state for a platform motion, of which the kinematics may be known already.
 
         Raises
         ------
@@ -202,28 +380,28 @@ class ThreePprs:
         SingularityError
             For a pose nearer to a singularity than `bounds` allow.
         """
-        found = PlatformKinematics(
-            self.geometry, motion, self.bounds.rod_sine, self.bounds.condition_number)
-        # Very large numbers overflow; users of the result check that it is finite.
-        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            if drive_motion is None:
-                drive_motion = found.drive_motion
-                _ = found.inverse_table
-        return MechanismState(*drive_motion, motion.time, channels=motion.channels, robot=self,
-                              reversal=reversal, known=found, motion=motion)
+        if found is None:
+            # Very large numbers overflow; users of the result check that it is finite.
+            with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+                found = ClosedForm(self, motion)
+                if not found.is_regular:
+                    found.require_regular()
+        return MechanismState(found.position, found.velocity, found.acceleration, motion.time,
+                              channels=motion.channels, robot=self, reversal=reversal,
+                              known=found, motion=motion)
 
     def remember(self, state: MechanismState, closed: object) -> None:
         """Store nothing: poses have a closed form."""
 
-    def kinematics(self, state: MechanismState) -> PlatformKinematics:
+    def kinematics(self, state: MechanismState) -> ClosedForm:
         """Return the kinematics of a state that lacks them."""
-        return PlatformKinematics(
-            self.geometry, state.motion, self.bounds.rod_sine, self.bounds.condition_number)
+        return ClosedForm(self, state.motion)
 
-    def loads(self, found: PlatformKinematics, load: StructureLoad | None) -> RigidBody:
+    def loads(self, found: ClosedForm, load: StructureLoad | None) -> ClosedForm:
         """Return frictionless drive forces and reactions."""
-        return solve_bodies(self.kernel_parameters, found.motion, found.chain_table,
-                            found.inverse_table, self.printed, load)
+        if load is found.load and self is found.robot:
+            return found
+        return ClosedForm(self, found.motion, load)
 
     def inverse_dynamics(self, state: MechanismState) -> None:
         """Return None: the model evaluates its one pass itself."""
@@ -248,17 +426,17 @@ class ThreePprs:
         Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
         with independent chains, the ratio for the cosine.
         """
-        bounds, J, chains = self.bounds, state.links.J, state.links.chains
-        number = condition_number(self.geometry, J[::-(-len(J) // MOST_CONDITIONS)])
+        bounds, found = self.bounds, state.links
+        number = condition_number(self.geometry, found.J[::-(-len(found.J) // MOST_CONDITIONS)])
         return float(1 - max(number.max() / bounds.condition_number,
-                             bounds.rod_sine / np.abs(chains.sin_u).min(),
-                             bounds.rod_cosine / np.abs(chains.cos_u).min()))
+                             bounds.rod_sine / np.abs(found.sin_u).min(),
+                             bounds.rod_cosine / np.abs(found.cos_u).min()))
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""
         motion = state.motion
         x, y, z = motion.position.T
-        return {'load': state.friction_load, 'rod_angle': np.tile(state.links.chains.rod_angle, 2),
+        return {'load': state.friction_load, 'rod_angle': np.tile(state.links.rod_angle, 2),
                 'platform_x': x, 'platform_y': y, 'platform_z': z,
                 'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
 
@@ -266,3 +444,11 @@ class ThreePprs:
         """Raise ModelError, of a key and its value, for bodies that cannot be."""
         if not self.masses.total > 0 or min(self.masses.rods) < 0:
             raise ModelError(key, value, 'leave masses greater than 0')
+
+
+def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:
+    """Return the quaternions x, y, z, w of turns about z, then the new y, then the new x."""
+    (z, y, x), (c_z, c_y, c_x) = ([turn(angle / 2) for angle in (yaw, pitch, roll)]
+                                  for turn in (np.sin, np.cos))
+    return np.column_stack((x * c_y * c_z - c_x * y * z, c_x * y * c_z + x * c_y * z,
+                            c_x * c_y * z - x * y * c_z, c_x * c_y * c_z + x * y * z))

@@ -125,7 +125,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     model, robot = expressed.model, expressed.robot
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    mechanism = robot.as_mechanism(model.strokes, model.effort_limits, is_free=kind != URDF)
+    limits = model.limits
+    mechanism = robot.as_mechanism(limits.strokes, limits.efforts, is_free=kind != URDF)
     return described('three_pprs', mechanism, expressed.joints)
 
 

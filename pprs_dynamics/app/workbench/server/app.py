@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,6 @@ from pprs_dynamics.app.workbench.masks import (
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.offered import index_of
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.view_state import units_to_dict
@@ -157,22 +156,21 @@ class Api:
         return self.screen(body)
 
     def screen(self, query: Any) -> Response:
-        """Answer what of the screen changed since a version, the errors now where they did."""
+        """Answer the state, and the errors now unless the browser has drawn them already."""
         hub = self.hub
-        with hub.steady():
-            session, version = hub.session, hub.log.version
+        # Read first: what changes meanwhile has a later version, which is asked for again.
+        session, version = hub.session, hub.version
+        with session.ticks.steady() if session else nullcontext():
             state = {'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
                      'has_folders': bool(hub.offered.folders),
-                     'is_empty': session is None,
+                     'is_empty': session is None, 'version': version,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
-            state['drawn'] = [state.get(key) for key in ('fitted_since', 'revision', 'stage')]
-            version = hub.log.update(state, version)
-            known = index_of(str((query or {}).get('since', '')), version + 1)
-            changes = hub.log.since(-1 if known is None else known)
-            return binary({**changes, 'version': version},
-                          {'now': session.ticks.view.residual.T}
-                          if session and 'drawn' in changes else {})
+            state['drawn'] = ' '.join(
+                str(state.get(key)) for key in ('fitted_since', 'revision', 'stage'))
+            if session is None or (query or {}).get('drawn') == state['drawn']:
+                return binary(state, {})
+            return binary(state, {'now': session.ticks.view.residual.T})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
@@ -267,7 +265,7 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.offered.in_folders()})
+        return JSONResponse({'files': [*self.hub.offered.files()]})
 
     def open(self, body: Fields) -> Response:
         """Open a recording of the folders that were given."""
@@ -327,7 +325,7 @@ class Api:
                 while not self.hub.is_over:
                     with suppress(TimeoutError):
                         await asyncio.wait_for(queue.get(), HEARTBEAT)
-                    yield b'data: %d\n\n' % self.hub.log.version
+                    yield b'data: %d\n\n' % self.hub.version
             finally:
                 self.hub.unsubscribe(queue)
         return StreamingResponse(lines(), media_type='text/event-stream')

@@ -10,7 +10,7 @@ import logging
 import re
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory, mkdtemp
@@ -18,9 +18,9 @@ from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
 from pprs_dynamics.app.api.inputs import Inputs
+from pprs_dynamics.app.fleet.recordings import ENDINGS
 from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.server.change_log import ChangeLog
-from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
+from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
@@ -77,8 +77,8 @@ class Hub:
         self.is_beginning = True
         self._is_unjudged = False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
-        self.log = ChangeLog()
-        self._uploaded, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
+        self.version = 0  # counts changes of the state
+        self._uploaded, self._lock, self._opening = 0, Lock(), Lock()
         self._work = Event()
         self.is_over = False
         self._waiting: set[asyncio.Queue[None]] = set()
@@ -110,12 +110,6 @@ class Hub:
         self._worker.join(10)
         self._uploads.cleanup()
 
-    @contextmanager
-    def steady(self) -> Iterator[None]:
-        """Prevent changes of the state while the block lasts."""
-        with self._steady, self.session.ticks.steady() if self.session else nullcontext():
-            yield
-
     # Those who listen
 
     def subscribe(self) -> asyncio.Queue[None]:
@@ -130,7 +124,8 @@ class Hub:
 
     def notify(self) -> None:
         """Notify all browsers of a change."""
-        self.log.count()
+        with self._lock:
+            self.version += 1
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
                 self._loop.call_soon_threadsafe(self._put)

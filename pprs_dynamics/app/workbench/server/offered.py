@@ -5,19 +5,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
+from pprs_dynamics.app.fleet.recordings import BAG, recordings_in
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.system.numbers import parse_whole
 from pprs_dynamics.system.plain_text import displayed
 
-ENDINGS = ('.csv', '.mcap', '.db3')
-METADATA = 'metadata.yaml'  # makes a folder a rosbag2 recording
-MOST_LISTED, DEEPEST = 2000, 6
+MOST_LISTED = 2000
 
 
 class NotOfferedError(PprsError, ValueError):
@@ -26,7 +23,7 @@ class NotOfferedError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class Offered:
-    """What browsers may choose from.
+    """Recordings to choose from.
 
     Parameters
     ----------
@@ -38,59 +35,26 @@ class Offered:
 
     @classmethod
     def of(cls, paths: Sequence[str]) -> Offered:
-        """Return what is in the folders among the paths that are no recordings themselves."""
+        """Return the folders among the paths that are no recordings themselves."""
         return cls(tuple(Path(path) for path in paths if is_folder(path)))
 
-    def in_folders(self) -> list[str]:
-        """Return what may be opened, each as `number/path within its folder`."""
-        found: list[str] = []
-        for number, root in enumerate(self.folders):
-            for place, folders, files in os.walk(root):
-                inside = Path(place).relative_to(root)
-                if METADATA in files:
-                    found.append(f'{number}/{inside.as_posix()}')
-                    folders.clear()
-                    continue
-                found += [f'{number}/{(inside / name).as_posix()}' for name in sorted(files)
-                          if name.lower().endswith(ENDINGS)]
-                folders[:] = sorted(name for name in folders if not name.startswith('.'))
-                if len(inside.parts) >= DEEPEST:
-                    folders.clear()
-                if len(found) >= MOST_LISTED:
-                    return found[:MOST_LISTED]
-        return found
+    def files(self) -> dict[str, Path]:
+        """Return recordings by `number/path within its folder`, without links to elsewhere."""
+        found = ((f'{number}/{path.relative_to(root).as_posix()}', path)
+                 for number, root in enumerate(self.folders) for path in recordings_in(root)
+                 if path.resolve().is_relative_to(root.resolve()))
+        return dict(islice(found, MOST_LISTED))
 
     def path(self, name: str) -> Path:
-        """Return the path of a name of `in_folders`.
-
-        Raises
-        ------
-        NotOfferedError
-            For any other, by whatever way it leads outside: `..`, an absolute path, a link.
-        """
-        number, _, inside = name.partition('/')
-        at = index_of(number, len(self.folders))
-        if at is not None and inside:
-            root = self.folders[at].resolve()
-            # Too long, or with characters that no file system has.
-            with suppress(OSError, ValueError):
-                path = (root / inside).resolve()
-                if path != root and path.is_relative_to(root) and path.exists():
-                    return path
-        raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
-                              'that were given')
-
-
-def index_of(text: str, count: int) -> int | None:
-    """Return a place in a list of so many entries, None where the text is none."""
-    with suppress(ValueError):
-        at = parse_whole(text)
-        return at if at < count else None
-    return None
+        """Return the path of a name of `files`; NotOfferedError for any other."""
+        if (path := self.files().get(name)) is None:
+            raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
+                                  'that were given')
+        return path
 
 
 def is_folder(path: str) -> bool:
     """Return whether a path is a folder that holds recordings, and none itself."""
     # An empty name would be the present folder, which nobody named.
     return bool(path) and Path(path).is_dir() and not (
-        (Path(path) / METADATA).exists() or any(Path(path).glob('*.db3')))
+        (Path(path) / BAG).exists() or any(Path(path).glob('*.db3')))

@@ -9,8 +9,8 @@ An answer is a JSON header with arrays for typed arrays, or a file to download.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
+from sys import float_info
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from starlette.responses import Response
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 
-MOST_DIGITS = 25  # of a number: a float has 17, and its exponent
+LARGEST = float_info.max  # whole numbers of JSON may be larger
 
 
 class BadRequestError(PprsError, ValueError):
@@ -33,9 +33,8 @@ class Fields(dict[str, Any]):
     def of(cls, content: bytes) -> Fields:
         """Return the fields of a JSON object, all numbers finite and all text Unicode."""
         try:
-            body = json.loads(content, parse_int=lambda text: int(_number(text)),
-                              parse_float=_number, parse_constant=_number)
-            json.dumps(body, ensure_ascii=False).encode()  # raises for lone surrogates
+            body = json.loads(content)
+            json.dumps(body, ensure_ascii=False, allow_nan=False).encode()
         except (ValueError, RecursionError):
             raise BadRequestError('the body is no JSON of finite numbers and of text') from None
         if not isinstance(body, dict):
@@ -76,14 +75,8 @@ class Fields(dict[str, Any]):
         return value
 
 
-def _number(text: str) -> float:
-    if len(text) > MOST_DIGITS or not math.isfinite(float(text)):
-        raise ValueError(text)
-    return float(text)
-
-
 def _is_number(value: Any, rule: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > LARGEST:
         raise BadRequestError(rule)
     return value
 

@@ -72,9 +72,11 @@ class JointFrictionEffect(PassiveJointEffect):
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        blocks: dict[str, dict[str, float]] = self.to_file()
-        for name, block in blocks.items():
-            block['radius'] = self.radii[name]
+        blocks: dict[str, dict[str, float]] = {}
+        for key, value in self.values.items():
+            joint, _, name = key.rpartition('.')
+            if value:
+                blocks.setdefault(joint, {'radius': self.radii[joint]})[name] = value
         force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))
         return force
 

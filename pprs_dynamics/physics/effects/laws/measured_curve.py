@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -153,18 +153,23 @@ class MeasuredCurve(DriveEffect):
         return None
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from `{drive: {variable, from, to, values, periodic}}`."""
-        prefix = f'effects.{cls.name}'
-        if not isinstance(values, Mapping) or not values:
-            raise ModelError(prefix, values, 'map drives to curves, e.g. lift_1: {variable: '
-                             'position, from: 0.0, to: 0.1, values: [...]}')
-        return cls({drive: _checked(f'{prefix}.{drive}', block, complete)
-                    for drive, block in values.items()})
-
-    def to_file(self) -> dict[str, Any]:
-        """Return `{drive: {variable, from, to, values, periodic}}`."""
-        return {drive: dict(values) for drive, values in self.drives.items()}
+    def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
+                 turns: bool | None = None) -> dict[str, Any]:
+        for key in values:
+            if key not in CHECKS:
+                raise UnknownNameError('key', f'{prefix}.{key}',
+                                       [f'{prefix}.{known}' for known in CHECKS])
+        given = {'periodic': False, **values}
+        found = {}
+        for key, check in CHECKS.items():
+            if key in given:
+                found[key] = check(f'{prefix}.{key}', given[key])
+            elif complete:
+                raise ModelError(f'{prefix}.{key}', MISSING, 'be given')
+        if not found.get('from', -math.inf) < found.get('to', math.inf):
+            raise ModelError(f'{prefix}.to', found['to'],
+                             f'be greater than from, {found["from"]:g}')
+        return found
 
 
 def variable_of(state: MechanismState, drive: str, variable: str) -> Array:
@@ -186,24 +191,6 @@ def check_variable(key: str, variable: Any, drives: Sequence[str] = ()) -> str:
     if of and drives and other not in drives:
         raise UnknownNameError('drive', other, drives, key)
     return variable
-
-
-def _checked(prefix: str, block: Any, complete: bool) -> dict[str, Any]:
-    if not isinstance(block, Mapping):
-        raise ModelError(prefix, block, f'map {", ".join(CHECKS)} to their values')
-    for key in block:
-        if key not in CHECKS:
-            raise UnknownNameError('key', f'{prefix}.{key}', [f'{prefix}.{one}' for one in CHECKS])
-    given = {'periodic': False, **block}
-    found = {}
-    for key, check in CHECKS.items():
-        if key in given:
-            found[key] = check(f'{prefix}.{key}', given[key])
-        elif complete:
-            raise ModelError(f'{prefix}.{key}', MISSING, 'be given')
-    if not found.get('from', -math.inf) < found.get('to', math.inf):
-        raise ModelError(f'{prefix}.to', found['to'], f'be greater than from, {found["from"]:g}')
-    return found
 
 
 def _values(key: str, values: Any) -> list[float]:
