@@ -58,7 +58,7 @@ def efforts_by_mujoco(text: str, model: DriveModel, motion: Any) -> tuple[Any, A
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)
     forces = model.drive_forces(motion)
-    chains = forces.mechanism.links.chains
+    chains = forces.mechanism.links
     joints = {**{name: (chains.position[:, k], chains.velocity[:, k], chains.acceleration[:, k])
                  for k, name in enumerate(model.drives)},
               **{f'hinge_{i + 1}': (chains.rod_angle[:, i], chains.u_dot[:, i], chains.u_ddot[:, i])
