@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
@@ -22,9 +22,6 @@ from scipy.special import log_ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
-
-if TYPE_CHECKING:
-    from pprs_dynamics.inference.regression.joint_fit import Regression
 
 # A tolerance is a limit: beyond it a number's prior is this many times as steep.
 BEYOND_TOLERANCE = 25.0
@@ -210,6 +207,21 @@ class Posterior:
     log_det: float
 
 
+class Fitted(Protocol):
+    """What the equations need of a regression."""
+
+    columns: tuple[BaseColumn, ...]
+    drives: tuple[int, ...]
+    base_index: dict[int, np.typing.NDArray[np.int_]]
+    base_products: dict[int, Array]
+
+    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
+        """Return band sums of products of a block's rows with others' on a drive."""
+
+    def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
+        """Return those of a drive and the blocks that it feels."""
+
+
 class DriveEquations:
     """Band sums of one drive's columns with each other and with the error.
 
@@ -217,13 +229,13 @@ class DriveEquations:
 
     Parameters
     ----------
-    regression : Regression
+    regression : Fitted
     d : int
     acting : sequence of Block
         With rows on the drive.
     """
 
-    def __init__(self, regression: Regression, d: int, acting: Sequence[Block]) -> None:
+    def __init__(self, regression: Fitted, d: int, acting: Sequence[Block]) -> None:
         base = regression.base_products[d]
         count, first = base.shape[0], base.shape[1] - 1
         size = first + sum(block.size for block in acting)
@@ -278,7 +290,7 @@ class Solution:
 class NormalEquations:
     """The normal equations of all drives."""
 
-    def __init__(self, regression: Regression, blocks: Sequence[Block]) -> None:
+    def __init__(self, regression: Fitted, blocks: Sequence[Block]) -> None:
         self.prior = Prior.of(regression.columns, blocks)
         place = len(regression.columns)
         self.places: dict[Block, slice] = {}
