@@ -233,35 +233,18 @@ ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
 
 
-class Sizes(NamedTuple):
-    """Numbers of rows of the tables, and of the columns of some."""
+# Names of the numbers of rows of the tables, and of the columns of some.
+SIZES = ('frames', 'joints', 'coordinates', 'drives', 'passive', 'loops', 'closure_frames', 'rows',
+         'path', 'starts', 'swap', 'below', 'right', 'links', 'forces', 'loop_forces', 'solved')
 
-    frames: int
-    joints: int
-    coordinates: int
-    drives: int
-    passive: int
-    loops: int
-    closure_frames: int
-    rows: int
-    path: int
-    starts: int
-    swap: int
-    below: int
-    right: int
-    links: int
-    forces: int
-    loop_forces: int
-    solved: int
 
-    @classmethod
-    def of(cls, t: Model) -> Sizes:
-        """Return those of tables."""
-        joints, loops = len(t.joints), len(t.closures)
-        return cls(len(t.frames), joints, len(t.places), len(t.drives), len(t.passive), loops,
-                   len(t.closure_frames), len(t.rows), len(t.path), len(t.starts), len(t.swap),
-                   len(t.below), len(t.right), OF_LINK * joints, OF_FORCES * joints,
-                   OF_FORCES * loops, len(t.passive) + len(t.drives))
+def _sizes_of(t: Model) -> Integers:
+    """Return the numbers that `SIZES` names, of tables."""
+    found = {name: rows for table, shape in SHAPES[Model].items()
+             for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
+    found |= {'links': OF_LINK * len(t.joints), 'forces': OF_FORCES * len(t.joints),
+              'loop_forces': OF_FORCES * len(t.closures), 'solved': len(t.passive) + len(t.drives)}
+    return np.array([found[name] for name in SIZES], dtype=np.int64)
 
 
 SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
@@ -294,17 +277,14 @@ class PackedTables(NamedTuple):
 
 def packed_tables(t: Model) -> PackedTables:
     """Return tables as rows of numbers."""
-    sizes = np.array(Sizes.of(t), dtype=np.int64)
     first = Model._fields.index(FIRST_OF_REALS)
-    return PackedTables(sizes, np.concatenate([np.ravel(values) for values in t[:first]]),
+    return PackedTables(_sizes_of(t), np.concatenate([np.ravel(values) for values in t[:first]]),
                         np.concatenate([np.ravel(values) for values in t[first:]]))
 
 
 def length_of(kind: type, sizes: Integers) -> int:
     """Return how many numbers a row of a named tuple has."""
-    by_name = dict(zip(Sizes._fields, sizes.tolist(), strict=True))
-    return sum(math.prod(by_name[n] if isinstance(n, str) else n for n in shape)
-               for shape in SHAPES[kind].values())
+    return _places(kind, tuple(sizes.tolist()))[-1][1]
 
 
 def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
@@ -315,7 +295,7 @@ def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
 
 @cache
 def _places(kind: type, sizes: tuple[int, ...]) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
-    by_name = dict(zip(Sizes._fields, sizes, strict=True))
+    by_name = dict(zip(SIZES, sizes, strict=True))
     found, start = [], 0
     for shape in SHAPES[kind].values():
         numbers = tuple(by_name[n] if isinstance(n, str) else n for n in shape)
@@ -330,7 +310,7 @@ def _reader(kind: type) -> Callable[..., Any]:
     Its source is written out: Numba makes named tuples only where all their elements are.
     """
     lines = ['def read(sizes, row, more):', '    at = 0', *(
-        f'    {name} = sizes[{k}]' for k, name in enumerate(Sizes._fields))]
+        f'    {name} = sizes[{k}]' for k, name in enumerate(SIZES))]
     for name, shape in SHAPES[kind].items():
         if name == FIRST_OF_REALS:
             lines.append('    at = 0')
