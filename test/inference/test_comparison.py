@@ -147,13 +147,3 @@ def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:
             ({'model': np.full((50, 2), np.inf)}, 'not finite')]:
         with pytest.raises(ResidualsError, match=words.replace('[', r'\[')):
             replace(right, **change)
-
-
-def test_a_drive_that_drifts_far_more_than_its_peers_is_told() -> None:
-    rng = np.random.default_rng(16)
-    error = 0.05 * rng.normal(size=(4000, 6))
-    error[:, 2] += 0.5 * ar1(0.995, 4000, rng)
-    found = compare(recording(error, np.ones((4000, 6)) * np.sin(np.arange(4000) / 90)[:, None]))
-    assert ('drive_2', 'time') in [(one.drive, one.variable)
-                                   for one in found.localisation.statements]
-    assert found.drives['drive_2'].grade != 'noise'

@@ -37,16 +37,17 @@ def test_a_rival_has_the_value_that_explains_the_same(ambiguous: Diagnosis) -> N
     assert ambiguous.verdict == 'ambiguous'
     best = ambiguous.effects[0]
     rivals = rival_effects(ambiguous)
-    assert {best.name} | {one.name for one in rivals} >= {'drive_spring', 'drive_inertia'}
-    values = {one.name: one.parameters for one in (best, *rivals)}
+    found = [best, *(rival.found for rival in rivals)]
+    assert {effect.name for effect in found} >= {'drive_spring', 'drive_inertia'}
+    values = {one.name: one.parameters for one in found}
     spring = values['drive_spring'][f'{AXIS}.stiffness']
     mass = values['drive_inertia'][f'{AXIS}.mass']
     assert spring.value == pytest.approx(SPRING, abs=4 * spring.std)
     assert mass.value == pytest.approx(-SPRING / OMEGA ** 2, abs=4 * mass.std)
     for rival in rivals:
-        if rival.name in ('drive_spring', 'drive_inertia'):
-            left = rival.force - best.force
+        if rival.found.name in ('drive_spring', 'drive_inertia'):
+            left = rival.found.force - best.force
             assert np.sqrt(np.mean(left ** 2)) < 0.1 * np.sqrt(np.mean(best.force ** 2))
-            assert rival.error_after == pytest.approx(best.error_after, rel=0.05)
-            assert rival.held_out_after == pytest.approx(best.held_out_after, rel=0.05)
+            assert rival.found.error_after == pytest.approx(best.error_after, rel=0.05)
+            assert rival.found.held_out_after == pytest.approx(best.held_out_after, rel=0.05)
             assert 0 <= rival.cost < 10

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.trajectory_request import reader_for
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
@@ -53,7 +53,7 @@ def forwarded(
     message = conversions.write_trajectory(
         motion, conversions.time(NOW + round(ahead * 1e9)),
         [round(k * 1e9 / rate) for k in range(points)])
-    request = reader_for(model).read(serialize_message(message), NOW, 'reject')
+    request = readers_for(model)[TRAJECTORY].read(serialize_message(message), NOW, 'reject')
     feedforward = Feedforward(model, OWN)
     drives = feedforward.ending_at_rest(feedforward.answer(request), stop_time)
     return drives.message(request.start, conversions.PAPER)

@@ -69,11 +69,12 @@ def _adoption(before: Residuals) -> Page:
     friction = found_effect('coulomb_friction').force
     with_it = replace(after, parts={'coulomb_friction': friction})
     return adoption_page(Adoption(
-        EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), True, False,
-        'the error on held-out data falls', (), ('the recordings call for time_delay, too',),
-        {'lift_2.force': Estimate(0.6, 0.01, 'N')}, (calibration(),), ('load_friction',), model,
-        model, before, with_it, 0.25, 0.051, 0.26, 0.052, VALIDATION, NOISE,
-        dict.fromkeys(DRIVES, NOISE)), [], [], 'pprs diagnose run.mcap --model better.yaml')
+        EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), model, model, before, with_it,
+        0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE), NOISE,
+        {'lift_2.force': Estimate(0.6, 0.01, 'N')},
+        remarks=('the recordings call for time_delay, too',), calibrated=(calibration(),),
+        rivals=('load_friction',), reason='the error on held-out data falls'),
+        [], [], 'pprs diagnose run.mcap --model better.yaml')
 
 
 def _history() -> Page:

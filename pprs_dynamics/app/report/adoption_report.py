@@ -18,12 +18,7 @@ from pprs_dynamics.app.report.diagnosis_figures import (
     curve_with_band,
 )
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import (
-    PlainTable,
-    escape,
-    stacked,
-    verdict_panel,
-)
+from pprs_dynamics.app.report.terminal import escape, stacked, verdict_panel
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import as_fitted, in_unit, plain, with_uncertainty
@@ -53,7 +48,7 @@ def _parts(answer: Adoption) -> Iterator[Any]:
     word, colour = (('refused', 'red') if not answer.adopted else
                     ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
     yield verdict_panel(word, colour, headline(answer))
-    held = 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
+    held = _held_out(answer)
     for label, before, after in (('recordings', answer.error_before, answer.error_after),
                                  (held, answer.held_out_before, answer.held_out_after)):
         yield f'  error on {label}: {plain(before)} → {plain(after)} {answer.unit}'
@@ -65,6 +60,10 @@ def _parts(answer: Adoption) -> Iterator[Any]:
         yield f'  … and {len(rows) - MOST_SHOWN} more, with --json or --report'
     for remark in answer.remarks[:MOST_REMARKS]:
         yield f'[yellow]![/] {escape(remark)}'
+
+
+def _held_out(answer: Adoption) -> str:
+    return 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
 
 
 def headline(answer: Adoption) -> str:
@@ -92,17 +91,6 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
         for told in sure_moments(effect, answer.parameters, answer.moments))]
 
 
-def errors_table(answer: Adoption, first: str) -> PlainTable:
-    """Return what was measured on, errors before and after, and their change."""
-    held = ('validation recordings' if answer.held_out_on == VALIDATION
-            else 'held-out blocks of the recordings')
-    return (first, f'before [{answer.unit}]', f'after [{answer.unit}]', 'change'), [
-        (label, f'{before:.3f}', f'{after:.3f}', f'{after / before - 1:+.1%}' if before else '')
-        for label, before, after in (
-            ('recordings', answer.error_before, answer.error_after),
-            (held, answer.held_out_before, answer.held_out_after))]
-
-
 def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                   validation: Sequence[Recording], command: str = '') -> Page:
     """Return the page of one adoption, or refusal: an answer on one screen, the rest folded.
@@ -124,6 +112,8 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     with page.columns():
         page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
                               answer.noise_floor),
+                     ErrorRow(_held_out(answer), answer.held_out_before, answer.held_out_after,
+                              answer.noise_floor),
                      *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                        for name in errors)],
                     f'Error on the recordings, rms [{answer.unit}], before (grey) and with the '
@@ -140,7 +130,6 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                     'cause. Beyond the measured range it is constant.')
     if command and answer.adopted:
         page.command('Look for further effects', command)
-    page.table(*errors_table(answer, 'error on'), caption='Errors on fitted and on held-out data.')
     page.bullets(answer.remarks)
     if answer.parameters:
         page.table(('parameter', '± two standard deviations'), parameter_rows(answer),

@@ -19,25 +19,19 @@ from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.profiles import Profile, error_profile, error_spectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
-WORST_SPANS = 3
-WORST_DURATION = 1.0  # [s]
-MAP_CELLS = 20
 FINE_BINS = 24
 VARIABLES = ('velocity', 'position', 'acceleration', 'load', 'rod_angle', 'time', 'platform_x',
              'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
 
 
-def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]) -> Any:
-    """Return measured and model above, their difference below, the worst spans marked."""
+def over_time(residuals: Residuals, drive: int) -> Any:
+    """Return measured and model above, their difference below."""
     time, measured, model = curves_of(residuals, residuals.measured[:, drive],
                                       residuals.model[:, drive])
-    figure = effort_over_error(
+    return effort_over_error(
         residuals, drive, time,
         (('measured', measured, charts.MEASURED), ('model', model, charts.MODEL)),
         (('measured minus model', measured - model, charts.ERROR),))
-    for start, end in worst:
-        figure.add_vrect(x0=start, x1=end, fillcolor=charts.MARK, opacity=0.25, line_width=0)
-    return figure
 
 
 Named = tuple[str, Array, str]
@@ -60,23 +54,6 @@ def effort_over_error(residuals: Residuals, drive: int, time: Array, efforts: Se
                 charts.trace(time, values, label, colour, hovertemplate=charts.hover(units),
                              showlegend=row == 1 or len(errors) == 1), row=row, col=1)
     return figure
-
-
-def worst_spans(residuals: Residuals, drive: int) -> list[tuple[float, float]]:
-    """Return the spans of one second with the largest squared error, worst first [s]."""
-    squares = np.nan_to_num(residuals.error[:, drive]) ** 2
-    length = max(1, round(WORST_DURATION / residuals.period))
-    if len(squares) <= length:
-        return []
-    energy = np.convolve(squares, np.ones(length), 'valid')
-    spans = []
-    for _ in range(WORST_SPANS):
-        start = int(np.argmax(energy))
-        if energy[start] <= 0:
-            break
-        spans.append((float(residuals.time[start]), float(residuals.time[start + length - 1])))
-        energy[max(0, start - length):start + length] = 0
-    return spans
 
 
 def against_variables(residuals: Residuals, comparison: Comparison) -> list[tuple[Any, str]]:
@@ -163,18 +140,25 @@ def _profile(residuals: Residuals, drive: int, variable: str, noise: NoiseSpectr
 
 def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str) -> Any:
     unit = _power(residuals.units_of(statement.drive).effort)
-    found = error_spectrum(residuals, residuals.drives.index(statement.drive), noise)
-    keep = found.frequency > 0
-    figure = _over_frequency(
-        [charts.trace(found.frequency[keep], power[keep], name, colour, 1.2,
-                      hovertemplate=f'%{{y:.3g}} {unit}')
-         for name, power, colour in (('error', found.power, charts.ERROR),
-                                     ('noise', found.background, charts.MEASURED))],
-        300, f'{what} on {statement.drive} [{unit}]')
+    figure = _over_frequency(_spectra(residuals, statement.drive, noise), 300,
+                             f'{what} on {statement.drive} [{unit}]')
     if statement.range is not None:
         figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
                          fillcolor=charts.MARK, opacity=0.3, line_width=0)
     return figure
+
+
+def _spectra(residuals: Residuals, drive: str, noise: NoiseSpectrum) -> list[Any]:
+    """Return the spectra of the error and of the noise of a drive."""
+    found = error_spectrum(residuals, residuals.drives.index(drive), noise)
+    keep = found.frequency > 0
+    frequency, power, background = charts.thinned(found.frequency[keep], found.power[keep],
+                                                  found.background[keep])
+    unit = _power(residuals.units_of(drive).effort)
+    return [charts.trace(frequency, values, f'{drive}: {label}', colour, 1.2,
+                         meta={'drive': drive}, hovertemplate=f'%{{y:.3g}} {unit}')
+            for label, values, colour in (('error', power, charts.ERROR),
+                                          ('noise', background, charts.MEASURED))]
 
 
 def _over_frequency(traces: list[Any], height: int, title: str) -> Any:
@@ -198,50 +182,12 @@ def axis_of(variable: str, residuals: Residuals, drive: str = '') -> tuple[float
     return found[0][0], f'{in_words(variable)} [{unit}]'
 
 
-def over_workspace(residuals: Residuals) -> Any | None:
-    """Return the rms error of each drive over the platform's x and y; None on one axis."""
-    x, y = residuals.variables.get('platform_x'), residuals.variables.get('platform_y')
-    if x is None or y is None or np.ptp(x) == 0 or np.ptp(y) == 0:
-        return None
-    edges = [np.linspace(axis.min(), axis.max(), MAP_CELLS + 1) for axis in (x, y)]
-    centres = [(axis[1:] + axis[:-1]) / 2 for axis in edges]
-    traces = []
-    for drive, name in enumerate(residuals.drives):
-        error = residuals.error[:, drive]
-        known = np.isfinite(error)
-        total = np.histogram2d(x[known], y[known], edges, weights=error[known] ** 2)[0]
-        samples = np.histogram2d(x[known], y[known], edges)[0]
-        held = samples > 0
-        i, j = np.nonzero(held)
-        traces.append(charts.plotly_objects().Scatter(
-            x=1e3 * centres[0][i], y=1e3 * centres[1][j], mode='markers', meta={'drive': name},
-            marker={'symbol': 'square', 'size': 15, 'colorscale': 'Cividis',
-                    'color': np.sqrt(total[held] / samples[held]).astype(np.float32),
-                    'colorbar': {'title': 'rms [N]'}},
-            hovertemplate='x %{x:.1f} mm, y %{y:.1f} mm: %{marker.color:.3f} N<extra></extra>'))
-    figure = charts.figure(traces, 460, margin={**charts.MARGIN, 't': 10}, showlegend=False,
-                           xaxis_title='platform x [mm]', yaxis_title='platform y [mm]')
-    figure.update_yaxes(scaleanchor='x')
-    return figure
-
-
 def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
     """Return the spectra of error and noise of each drive."""
-    traces = []
-    for drive, name in enumerate(residuals.drives):
-        noise = comparison.localisation.drives[name].noise
-        if noise is None:
-            continue
-        found = error_spectrum(residuals, drive, noise)
-        keep = found.frequency > 0
-        frequency, power, background = charts.thinned(found.frequency[keep], found.power[keep],
-                                                      found.background[keep])
-        unit = _power(residuals.units_of(name).effort)
-        for label, values, colour in (('error', power, charts.ERROR),
-                                      ('noise', background, charts.MEASURED)):
-            traces.append(charts.trace(frequency, values, f'{name}: {label}', colour, 1.2,
-                                       meta={'drive': name}, hovertemplate=f'%{{y:.3g}} {unit}'))
-    return _over_frequency(traces, 360, f'power [{_power(residuals.unit)}]')
+    noises = {name: comparison.localisation.drives[name].noise for name in residuals.drives}
+    return _over_frequency([trace for name, noise in noises.items() if noise is not None
+                            for trace in _spectra(residuals, name, noise)], 360,
+                           f'power [{_power(residuals.unit)}]')
 
 
 def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:

@@ -20,17 +20,18 @@ from pprs_dynamics.app.report.comparison_figures import (
     middles,
 )
 from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect
-from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, remaining_residuals
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, with_error
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 POINTS = 400  # of a curve, and of the errors around it
 TIME = {'title': 'time [s]', **charts.SECONDS}
-AFTER, FLOOR, RIVAL, OTHER = '#009E73', '#1a1a1a', '#E69F00', '#bbbbbb'
+AFTER, FLOOR, OTHER = '#009E73', '#1a1a1a', '#bbbbbb'
 
 
 def before_and_after(before: Residuals, after: Residuals, drive: int, floor: float) -> Any:
@@ -118,13 +119,14 @@ def add_contributions(page: Page, residuals: Residuals, forces: dict[str, Any], 
     page.figure(contributions(residuals, forces), caption, over_time=True)
 
 
-def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
+def effect_pictures(diagnosis: Diagnosis, found: FoundEffect, remaining: Array,
                     ) -> list[tuple[Any, str]]:
     """Return what one effect has to explain and what it makes of it, with captions.
 
-    The first is over the variable that the effect depends on; the last is over time.
+    The first is over the variable that the effect depends on; the last is over time. `remaining` is
+    the residual of the row of the effect, (M, D) [N].
     """
-    part = partial_residual(diagnosis, found)
+    part = partial_residual(diagnosis, found, remaining)
     residuals = diagnosis.residuals
     drive = residuals.drives[part.drive]
     units = residuals.units_of(drive)
@@ -156,31 +158,5 @@ def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
 def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
     """Return the shape of what remains along what it depends on."""
     noise = diagnosis.noise.get(statement.drive)
-    return None if noise is None else along(remaining_residuals(diagnosis), noise, statement,
-                                            'what remains')
-
-
-def evidence_bars(diagnosis: Diagnosis) -> Any:
-    """Return the evidence for each candidate for the first place."""
-    unit = diagnosis.residuals.unit
-    ranked = sorted(diagnosis.candidates, key=lambda candidate: candidate.evidence)
-    adopted = {effect.name for effect in diagnosis.effects}
-    rivals = {name for names in diagnosis.indistinguishable for name in names[1:]}
-    names = [candidate.name for candidate in ranked]
-    evidence = [candidate.evidence for candidate in ranked]
-    colours = [charts.MODEL if name in adopted else RIVAL if name in rivals else OTHER
-               for name in names]
-    lowest, highest = min(0.0, *evidence), max(0.0, *evidence)
-    reach = highest - lowest or 1.0
-    figure = charts.figure([charts.plotly_objects().Bar(
-        x=evidence, y=names, orientation='h',
-        marker={'color': colours}, text=[f'{value:.0f}' for value in evidence],
-        textposition='outside', cliponaxis=False,
-        hovertext=[f'error after: {candidate.error_after:.3f} {unit}' for candidate in ranked],
-        hoverinfo='text')],
-        90 + 26 * len(ranked), margin={**charts.MARGIN, 't': 15, 'r': 60},
-        yaxis={'automargin': True}, xaxis={
-            'title': 'evidence',
-            'range': [lowest - 0.12 * reach * (lowest < 0), highest + 0.15 * reach]})
-    figure.add_vline(x=0, line={'color': FLOOR, 'width': 1.2, 'dash': 'dash'})
-    return figure
+    return None if noise is None else along(
+        with_error(diagnosis.residuals, diagnosis.remaining), noise, statement, 'what remains')

@@ -20,14 +20,13 @@ from pprs_dynamics.app.report.terminal import (
     shell_command,
     stacked,
     text_table,
+    titled_table,
     verdict_panel,
 )
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
-from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
 from pprs_dynamics.inference.diagnosis.quantities import (
-    in_unit,
     listed,
     name_drives,
     plain,
@@ -43,10 +42,9 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     unexplained_groups,
     word_detectable,
 )
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
-MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
 WIDTH = 80
 LONGEST = 400  # characters of rows, values and the runner-up without --details: five lines
 MOST_EFFECTS = 4  # that are shown without --details
@@ -55,7 +53,6 @@ LEAST_REFIT = 0.01  # share of the error, from which these are listed
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
 LEGEND = '[dim]Cost terms: fit = misfit; coefficients = prior; others = model choices[/]'
-SEEN = 'Not seen, and from which size it would have been'
 METHOD = (
     'Model and measured effort are filtered alike. Every effect of the catalogue is a column of '
     'one regression, in each shape and on each drive, together with the free numbers of the model.',
@@ -124,36 +121,55 @@ def _following(words: Sentences) -> Iterator[Any]:
 
 
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield everything that there is."""
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
     yield from (f'[blue]i[/] {escape(text)}' for text in words.reference)
     if diagnosis.effects:
-        held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
-                else 'blocks of the same recordings')
-        yield _table(f'Effects by error reduction; held out: {held}',
-                     _headings(diagnosis),
-                     _effect_rows(diagnosis), right=(2, 3, 4))
+        yield text_table(_headings(diagnosis), _effect_rows(diagnosis), right=(2, 3, 4),
+                         whole=(0, 2, 3, 4), frame='head', title=_held_out(diagnosis))
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
-        yield _finding(number, finding)
-    values = fitted_values(diagnosis)
-    if len({(value.effect, value.drive) for value in values}) > MOST_LISTED:
-        yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
-                     [tuple(map(escape, row)) for row in _joined(values)])
+        yield from _finding(number, finding)
+    for title, note, headings, rows in _tables(diagnosis):
+        yield titled_table(title, (headings, rows), right=(), caption=note)
+    for title, lines, colour in _lists(words):
+        yield f'[bold {colour}]{title}[/]'
+        yield from (_labelled([('-', line)], 1) for line in lines)
+        yield ''
+
+
+def _tables(diagnosis: Diagnosis) -> Iterator[tuple[str, str, Sequence[str],
+                                                    Sequence[Sequence[str]]]]:
+    """Yield tables with title, note, headings and rows, for the terminal and the page."""
+    if values := _joined(fitted_values(diagnosis)):
+        yield 'Values', 'Intervals are two standard deviations.', ('effect', 'drive', 'values'), (
+            values)
     if diagnosis.sets:
-        yield _table('The best sets of effects, and their costs above the best',
-                     ('cost', 'set', 'of which'),
-                     [(cost, escape(text), why) for text, cost, why in set_rows(diagnosis)])
-        yield LEGEND
+        yield ('The best sets of effects, and their costs above the best',
+               'A cost of 10 is odds of 150 to 1. Terms: fit = misfit; coefficients = prior; '
+               'others = model choices.', ('cost', 'set', 'terms'),
+               [(cost, text, why) for text, cost, why in set_rows(diagnosis)])
     if diagnosis.candidates:
-        yield _table('Each effect alone', (
-            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
-            (candidate.name, sites(candidate.drives, diagnosis), f'{candidate.evidence:.0f}',
-             f'{candidate.error_after:.3f}') for candidate in diagnosis.candidates], right=(2, 3))
+        yield ('Each effect alone', 'An evidence of 0 is the threshold.',
+               ('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
+               [(candidate.name, f'{candidate.evidence:.0f}', f'{candidate.error_after:.3f}',
+                 sites(candidate.drives, diagnosis)) for candidate in diagnosis.candidates])
     if rows := detectable_rows(diagnosis):
-        yield _table(SEEN, ('effect', 'size'), [tuple(map(escape, row)) for row in rows])
-    yield from _list('Calibrated within their tolerance', words.calibrated, 'blue')
-    yield from _list('Suspects', words.suspects, 'yellow')
-    yield from _list('Excluded sets', words.barred, 'blue')
-    yield from _list('Warnings', words.warnings, 'yellow')
+        yield ('Smallest effects that would have been reported', 'Each alone would have cost 10 '
+               'less than the answer at the noise of these recordings.', ('effect', 'size'), rows)
+
+
+def _lists(words: Sentences) -> list[tuple[str, Sequence[str], str]]:
+    """Return lists with title, lines and colour, for the terminal and the page."""
+    return [(title, lines, colour) for title, lines, colour in (
+        ('Calibrated within their tolerance', words.calibrated, 'blue'),
+        ('Suspects, which slow noise explains as well', words.suspects, 'yellow'),
+        ('Excluded sets', words.barred, 'blue'), ('Warnings', words.warnings, 'yellow')) if lines]
+
+
+def _held_out(diagnosis: Diagnosis) -> str:
+    return 'Effects by error reduction; held out: ' + (
+        'the --validate recordings' if diagnosis.held_out_on == 'validation'
+        else 'blocks of the same recordings')
 
 
 def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -182,17 +198,22 @@ def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
     return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
 
 
-def _finding(number: int, finding: Finding) -> Any:
-    from rich.padding import Padding
+def _finding(number: int, finding: Finding) -> Iterator[Any]:
+    yield f'[bold]{number}. {escape(finding.title)}[/]'
+    yield _labelled(finding_lines(finding), 8)
+    yield ''
+
+
+def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
+    """Return lines of text beside their labels."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 1))
-    grid.add_column(style='bold', width=8)
+    grid.add_column(style='bold', width=width)
     grid.add_column(ratio=1)
-    for label, text in finding_lines(finding):
+    for label, text in lines:
         grid.add_row(label, escape(text))
-    title = f'[bold]{number}. {escape(finding.title)}[/]'
-    return Padding(stacked(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
+    return grid
 
 
 def finding_lines(finding: Finding) -> list[tuple[str, str]]:
@@ -212,23 +233,6 @@ def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
 def _fall(before: float, after: float) -> str:
     colour = 'green' if after < before else 'red'
     return f'{plain(before)} → [{colour}]{plain(after)}[/]'
-
-
-def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
-    from rich.table import Table
-
-    if lines:
-        yield f'[bold {colour}]{title}[/]'
-        for line in lines:
-            grid = Table.grid(padding=(0, 1))
-            grid.add_row('-', escape(line))
-            yield grid
-        yield ''
-
-
-def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
-           right: Sequence[int] = ()) -> Any:
-    return text_table(headings, rows, right=right, whole=(0, *right), frame='head', title=title)
 
 
 def diagnosis_page(
@@ -255,33 +259,33 @@ def diagnosis_page(
     for text in words.reference:
         page.text(f'{text[:1].upper()}{text[1:]}.')
     page.sources(diagnosis.model.source, recordings, validation)
-    steps = error_steps(diagnosis, after)
     with page.columns():
-        _errors(page, diagnosis, steps)
+        _errors(page, diagnosis, after)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
     page.copy('Copy as Markdown', diagnosis_markdown(diagnosis, words))
     page.folded_list('Warnings', words.warnings, is_open=True)
     page.heading('Evidence')
-    _findings(page, diagnosis, words)
-    _contributions(page, diagnosis, steps)
-    _parameters(page, diagnosis, words)
+    _findings(page, diagnosis, words, rivals)
+    if diagnosis.effects:
+        with page.fold('Contribution of each effect'):
+            page.table(_headings(diagnosis), _plain(_effect_rows(diagnosis)),
+                       caption=f'{_held_out(diagnosis)}.')
+            figures.add_contributions(page, diagnosis.residuals, {
+                effect.name: effect.force for effect in diagnosis.effects},
+                'Contribution of each effect.')
     figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,
                             'with the input model and with the reported effects')
+    for title, note, headings, rows in _tables(diagnosis):
+        with page.fold(title):
+            page.text(note, 'note')
+            page.table(headings, rows)
+    for title, lines, _ in _lists(words):
+        if lines is not words.warnings:
+            page.folded_list(title, lines)
     with page.fold('Method'):
         page.text(' '.join(METHOD))
         page.bullets(diagnosis.notes)
-    if words.effects:
-        page.heading('Confirm it on the machine')
-        page.bullets([f'{finding.title}: {finding.confirm}' for finding in words.effects])
-    page.heading('Alternatives')
-    _alternatives(page, diagnosis, words, rivals)
-    if rows := detectable_rows(diagnosis):
-        page.heading(SEEN)
-        with page.fold('Smallest effects that would have been reported'):
-            page.text('Each alone would have cost 10 less than the answer at the noise of these '
-                      'recordings.', 'note')
-            page.table(('effect', 'size'), rows)
     return page
 
 
@@ -290,9 +294,7 @@ def diagnosis_markdown(diagnosis: Diagnosis, words: Sentences) -> str:
     rows = [f'**{diagnosis.verdict}**: {words.headline}']
     if diagnosis.effects:
         heads = _headings(diagnosis)
-        cells = [[re.sub(r'\[/?\w*\]', '', cell) for cell in row]
-                 for row in _effect_rows(diagnosis)]
-        table = (heads, ['---'] * len(heads), *cells)
+        table = (heads, ['---'] * len(heads), *_plain(_effect_rows(diagnosis)))
         rows.append('\n'.join(f'| {" | ".join(cell.replace("|", "/") for cell in row)} |'
                               for row in table))
         rows.append('\n'.join(f'- {f"{effect} on {drive}" if drive else effect}: {text}'
@@ -304,14 +306,19 @@ def diagnosis_markdown(diagnosis: Diagnosis, words: Sentences) -> str:
     return '\n\n'.join(rows) + '\n'
 
 
-def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
-    first, last, floors = steps[0], steps[-1], diagnosis.noise_floors
-    fell = len(steps) > 1
-    rows = [ErrorRow('all drives', first.overall, last.overall if fell else None,
+def _plain(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return rows without the colours of the terminal."""
+    return [[re.sub(r'\[/?\w*\]', '', cell) for cell in row] for row in rows]
+
+
+def _errors(page: Page, diagnosis: Diagnosis, after: Residuals) -> None:
+    floors, unit = diagnosis.noise_floors, diagnosis.residuals.unit
+    fell = bool(diagnosis.effects)
+    before, now = rms_by_drive(diagnosis.residuals), rms_by_drive(after)
+    rows = [ErrorRow('all drives', rms(diagnosis.residuals), rms(after) if fell else None,
                      diagnosis.noise_floor)]
-    rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
-             for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
-    unit = diagnosis.residuals.unit
+    rows += [ErrorRow(name, before[name], now[name] if fell else None, floor)
+             for name, floor in floors.items() if name in before]
     page.errors(rows, f'Error, rms [{unit}], before (grey) and with the reported effects (blue); '
                 'dotted: the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
 
@@ -325,15 +332,27 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
             page.figure(picture, f'What no effect explains, on {statement.drive}.')
             return
     if diagnosis.effects:
-        page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
+        page.figure(*figures.effect_pictures(
+            diagnosis, diagnosis.effects[0], diagnosis.remaining)[0])
 
 
-def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
-    if words.effects:
-        with page.fold('Reported effects'):
-            for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, effect.effect.card.equation),
-                          figures.effect_pictures(diagnosis, effect))
+def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
+              rivals: Sequence[RivalEffect]) -> None:
+    """Add a card with pictures for each effect, rival and unexplained pattern."""
+    cards = [(finding, effect, diagnosis.remaining) for finding, effect in zip(
+        words.effects, diagnosis.effects, strict=True)]
+    others = [(finding, rival.found, rival.remaining) for finding, rival in zip(
+        words.rivals, rivals, strict=True)]
+    for title, some in (('Reported effects', cards),
+                        ('Rivals, which explain the data about as well', others)):
+        if some:
+            with page.fold(title):
+                for finding, effect, remaining in some:
+                    first, *rest = finding_lines(finding)
+                    page.card(finding.title, [
+                        first, ('equation', effect.effect.card.equation),
+                        ('looks like', finding.mark), *rest],
+                        figures.effect_pictures(diagnosis, effect, remaining))
     if words.unexplained:
         with page.fold('Patterns that no effect of the catalogue explains'):
             for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
@@ -342,71 +361,3 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
                             for statement in group]
                 page.card(finding.title, finding_lines(finding),
                           [(figure, text) for figure, text in pictures if figure is not None])
-
-
-def _alternatives(page: Page, diagnosis: Diagnosis, words: Sentences,
-                  rivals: Sequence[RivalEffect]) -> None:
-    if words.rivals:
-        with page.fold('Rivals, which explain the data about as well'):
-            for finding, rival in zip(words.rivals, rivals, strict=True):
-                equation = rival.effect.card.equation
-                page.card(finding.title, _lines(finding, equation),
-                          figures.effect_pictures(diagnosis, rival))
-    _sets(page, diagnosis)
-    page.folded_list('Suspects, which slow noise explains as well', words.suspects)
-    page.folded_list('Excluded sets', words.barred)
-
-
-def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
-    lines = finding_lines(finding)
-    return [lines[0], ('equation', equation), ('looks like', finding.mark), *lines[1:]]
-
-
-def _sets(page: Page, diagnosis: Diagnosis) -> None:
-    if not diagnosis.sets:
-        return
-    with page.fold('The best sets of effects, and their costs'):
-        page.text('Cost above that of the best set. 10 are odds of 150 to 1; a set that costs '
-                  'less is a rival. Terms: misfit, prior of the coefficients, and penalties for '
-                  'names, drives, shapes and signs.', 'note')
-        page.table(('set', 'cost', 'terms'), set_rows(diagnosis))
-        if diagnosis.candidates:
-            page.figure(figures.evidence_bars(diagnosis),
-                        'Evidence of each effect alone; 0 is the threshold. Blue: reported. '
-                        'Yellow: a rival. Grey: explains less, or nothing in addition.')
-
-
-def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
-    if not diagnosis.effects:
-        return
-    unit = diagnosis.residuals.unit
-    where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
-             else 'blocks of the same recordings, the weaker evidence')
-    with page.fold('Error reduction by each effect'):
-        if len(steps) > 2:
-            page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
-                         for k, step in enumerate(steps)],
-                        f'Error over all drives, rms [{unit}], as one after the other is added; '
-                        f'the noise is '
-                        f'{in_unit(diagnosis.noise_floor, unit)}.')
-        page.table(('effect', 'evidence', f'error before [{unit}]', f'after [{unit}]',
-                    f'held out before [{unit}]', f'after [{unit}]', 'on'), [
-            (effect.name, f'{effect.evidence:.0f}', f'{effect.error_before:.3f}',
-             f'{effect.error_after:.3f}', f'{effect.held_out_before:.3f}',
-             f'{effect.held_out_after:.3f}',
-             sites(effect.drives, diagnosis, effect.places)) for effect in diagnosis.effects],
-            caption='Error before: without the force of this effect, all else as fitted. '
-            f'Held out before: fitted without it. Held out: {where}.')
-        figures.add_contributions(page, diagnosis.residuals, {
-            effect.name: effect.force for effect in diagnosis.effects},
-            'Contribution of each effect.')
-
-
-def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
-    values = fitted_values(diagnosis)
-    if values:
-        with page.fold('Values'):
-            page.table(('effect', 'drive', 'symbol', '± two standard deviations', 'parameter'),
-                       [(value.effect, value.drive, value.parameter.symbol, value.text,
-                         value.parameter.description) for value in values])
-    page.folded_list('Numbers of the model that moved within their tolerance', words.calibrated)

@@ -11,7 +11,7 @@ from typing import Any
 
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -27,59 +27,70 @@ class Adoption:
     request : EffectRequest or CurveRequest
     drives : tuple of str or None
         On which it was fitted.
-    adopted, forced : bool
-        Forced: in spite of objections.
-    reason : str
-        Why, in one sentence.
-    objections, remarks : tuple of str
-    parameters : dict of str to Estimate
-    calibrated : tuple of Calibration
-        Numbers of the model that moved within their tolerances.
-    rivals : tuple of str
-        Effects that explain the recordings as well.
     before, after : DriveModel
         As given; and with the effect. The latter is the former where the effect gives no model.
     residuals_before, residuals_after : Residuals
         On the recordings.
-    error_before, error_after, held_out_before, held_out_after : float
-        [N]
+    held_out_before, held_out_after : float
+        Errors on held-out data [N].
     held_out_on : {'blocks', 'validation'}
-    noise_floor : float
-        Root of the mean square of the noise, as the diagnosis has it [N].
     noise_floors : mapping of str to float
-        The same by drive [N].
-    curve : FittedCurve, optional
-        Of a measured curve, with its band.
+        Root of the mean square of the noise of each drive, as the diagnosis has it [N].
+    noise_floor : float
+        The same over drives [N].
+    parameters : mapping of str to Estimate
+    objections, remarks : tuple of str
+    calibrated : tuple of Calibration
+        Numbers of the model that moved within their tolerances.
+    rivals : tuple of str
+        Effects that explain the recordings as well.
     moments : mapping of str to Estimate
         First moments of added bodies: see `Estimates`.
+    curve : FittedCurve, optional
+        Of a measured curve, with its band.
     reference : tuple of str
         Runs since which the effect is a change; errors are beyond what they show as well.
+    adopted : bool
+    reason : str
+        Why, in one sentence.
     """
 
     request: EffectRequest | CurveRequest
     drives: tuple[str, ...] | None
-    adopted: bool
-    forced: bool
-    reason: str
-    objections: tuple[str, ...]
-    remarks: tuple[str, ...]
-    parameters: dict[str, Estimate]
-    calibrated: tuple[Calibration, ...]
-    rivals: tuple[str, ...]
     before: DriveModel
     after: DriveModel
     residuals_before: Residuals
     residuals_after: Residuals
-    error_before: float
-    error_after: float
     held_out_before: float
     held_out_after: float
     held_out_on: str
+    noise_floors: Mapping[str, float]
     noise_floor: float
-    noise_floors: dict[str, float]
-    curve: FittedCurve | None = None
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    objections: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    calibrated: tuple[Calibration, ...] = ()
+    rivals: tuple[str, ...] = ()
     moments: Mapping[str, Estimate] = field(default_factory=dict)
+    curve: FittedCurve | None = None
     reference: tuple[str, ...] = ()
+    adopted: bool = True
+    reason: str = ''
+
+    @property
+    def forced(self) -> bool:
+        """Whether it was adopted in spite of objections."""
+        return self.adopted and bool(self.objections)
+
+    @property
+    def error_before(self) -> float:
+        """Error on the recordings as given [N]."""
+        return rms(self.residuals_before)
+
+    @property
+    def error_after(self) -> float:
+        """Error on the recordings with the effect [N]."""
+        return rms(self.residuals_after)
 
     @property
     def unit(self) -> str:
@@ -93,16 +104,15 @@ class Adoption:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON of `pprs adopt`."""
+        moments = {key: estimate.to_dict() for key, estimate in self.moments.items()}
         return {
-            'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
+            **{name: getattr(self, name) for name in (
+                'adopted', 'reason', 'effect', 'error_before', 'error_after', 'held_out_before',
+                'held_out_after', 'held_out_on', 'noise_floor', 'forced')},
             'drives': None if self.drives is None else list(self.drives),
-            'error_before': self.error_before, 'error_after': self.error_after,
-            'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after,
-            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
-            'forced': self.forced, 'objections': list(self.objections),
-            'remarks': list(self.remarks), 'rivals': list(self.rivals),
-            'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
-            **({'moments': {key: one.to_dict() for key, one in self.moments.items()}}
-               if self.moments else {}),
+            'objections': list(self.objections), 'remarks': list(self.remarks),
+            'rivals': list(self.rivals),
+            'parameters': {key: estimate.to_dict() for key, estimate in self.parameters.items()},
+            **({'moments': moments} if moments else {}),
             **({'reference': list(self.reference)} if self.reference else {}),
-            'calibrated': [one.to_dict() for one in self.calibrated]}
+            'calibrated': [number.to_dict() for number in self.calibrated]}

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from os import PathLike
+from typing import Any
 
 from pprs_dynamics import __version__
 from pprs_dynamics.inference.adoption.adoption import Adoption
@@ -53,30 +54,27 @@ class LedgerBook:
         return replace(DriveModel.from_parameters(values), source=adoption.before.source)
 
     def _step(self, adoption: Adoption) -> Step:
-        before, after = (rms_by_drive(one) for one in (
+        before, after = (rms_by_drive(residuals) for residuals in (
             adoption.residuals_before, adoption.residuals_after))
-        found = adoption.parameters
+        estimates = adoption.parameters.values()
+        errors: dict[str, Any] = {name: _rounded(getattr(adoption, name)) for name in (
+            'error_before', 'error_after', 'held_out_before', 'held_out_after', 'noise_floor')}
         return Step(
             effect=adoption.effect, drives=adoption.drives or (),
-            parameters=tuple(found), values=tuple(one.value for one in found.values()),
-            std=tuple(_rounded(one.std, 3) for one in found.values()),
-            units=tuple(one.unit for one in found.values()),
-            recordings=tuple(one.name for one in self.fitted),
-            sha256=tuple(one.sha256 for one in self.fitted),
-            spans=tuple(time for one in self.fitted for time in one.span),
-            validation=tuple(one.name for one in self.validation),
-            validation_sha256=tuple(one.sha256 for one in self.validation),
-            reference=adoption.reference,
-            held_out_on=adoption.held_out_on,
-            error_before=_rounded(adoption.error_before),
-            error_after=_rounded(adoption.error_after),
-            held_out_before=_rounded(adoption.held_out_before),
-            held_out_after=_rounded(adoption.held_out_after),
-            noise_floor=_rounded(adoption.noise_floor), measured=tuple(before),
-            drive_errors_before=tuple(map(_rounded, before.values())),
+            parameters=tuple(adoption.parameters),
+            values=tuple(estimate.value for estimate in estimates),
+            std=tuple(_rounded(estimate.std, 3) for estimate in estimates),
+            units=tuple(estimate.unit for estimate in estimates),
+            recordings=tuple(entry.name for entry in self.fitted),
+            sha256=tuple(entry.sha256 for entry in self.fitted),
+            spans=tuple(time for entry in self.fitted for time in entry.span),
+            validation=tuple(entry.name for entry in self.validation),
+            validation_sha256=tuple(entry.sha256 for entry in self.validation),
+            reference=adoption.reference, held_out_on=adoption.held_out_on, **errors,
+            measured=tuple(before), drive_errors_before=tuple(map(_rounded, before.values())),
             drive_errors_after=tuple(map(_rounded, after.values())),
-            calibrated=tuple(one.label for one in adoption.calibrated), rivals=adoption.rivals,
-            objections=adoption.objections, forced=adoption.forced,
+            calibrated=tuple(number.label for number in adoption.calibrated),
+            rivals=adoption.rivals, objections=adoption.objections, forced=adoption.forced,
             date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
 
 

@@ -92,10 +92,9 @@ def adopt_all(
     """
     report = progress or (lambda what, share: None)
     steps: list[Adoption] = []
-    taken = 0
     refused: list[Adoption] = []
     decisions = DECISIONS if diagnosis is None else diagnosis.decisions
-    if diagnosis is not None and original(model) is not model:
+    if original(model) is not model:
         diagnosis = None
     while True:
         if diagnosis is None:
@@ -103,17 +102,8 @@ def adopt_all(
                                  lambda share: report('diagnosing', share), decisions,
                                  reference=reference)
         found = _next(diagnosis, {step.effect for step in refused})
-        if found is None and refused:
-            reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)
-            return AdoptionRun(tuple(steps), REFUSED, reasons, model, diagnosis)
-        if found is None or taken == MOST_STEPS:
-            ended = 'unknown' if diagnosis.verdict == 'unknown' else 'adequate'
-            reason = ('nothing that is left stands out against noise' if ended == 'adequate'
-                      else 'an error above the noise is left, and nothing that was found holds'
-                      if not diagnosis.depends_on
-                      else 'what remains no effect of the catalogue explains: '
-                      f'{diagnosis.depends_on[0].text}')
-            return AdoptionRun(tuple(steps), ended, reason, model, diagnosis)
+        if found is None or sum(step.adopted for step in steps) == MOST_STEPS:
+            return AdoptionRun(tuple(steps), *_end(diagnosis, refused), model, diagnosis)
         name = found.name
         step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
                      progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
@@ -123,7 +113,6 @@ def adopt_all(
             refused.append(step)
             continue
         model = record(step)
-        taken += 1
         refused.clear()
         if step.rivals:
             reason = (f'{", ".join(step.rivals)} would explain these recordings as well as {name}: '
@@ -132,9 +121,21 @@ def adopt_all(
         diagnosis = None
 
 
+def _end(diagnosis: Diagnosis, refused: Sequence[Adoption]) -> tuple[str, str]:
+    """Return how a run ends after its last diagnosis, and why."""
+    if refused:
+        return REFUSED, '; '.join(f'{step.effect}: {step.reason}' for step in refused)
+    if diagnosis.verdict != 'unknown':
+        return 'adequate', 'the remaining error does not differ from noise'
+    if diagnosis.depends_on:
+        return 'unknown', ('no effect of the catalogue explains what remains: '
+                           f'{diagnosis.depends_on[0].text}')
+    return 'unknown', 'the remaining error is larger than the noise, and no effect is supported'
+
+
 def _next(diagnosis: Diagnosis, refused: Set[str]) -> FoundEffect | None:
     """Return what to adopt: those that are certain first, an ambiguous one as the last."""
-    new = [one for one in diagnosis.effects if one.name not in refused]
+    new = [effect for effect in diagnosis.effects if effect.name not in refused]
     ambiguous = {name for names in diagnosis.indistinguishable for name in names}
-    certain = [one for one in new if one.name not in ambiguous]
+    certain = [effect for effect in new if effect.name not in ambiguous]
     return next(iter(certain or new), None)

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,10 +16,8 @@ from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
-from pprs_dynamics.inference.search.estimates import calibrations as moved_numbers
+from pprs_dynamics.inference.search.estimates import Estimate, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
-from pprs_dynamics.inference.search.reversal_widths import with_widths
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -86,85 +83,56 @@ def _candidate(row: Row, request: EffectRequest) -> EffectCandidate | None:
     return next((c for c in row.effects if c.name == request.name), None)
 
 
-@dataclass(frozen=True)
-class RequestedModel:
-    """The input model with the requested effect of a row, and without it.
+def requested_model(answer: Answer, request: EffectRequest, effect: FoundEffect,
+                    ) -> tuple[DriveModel, tuple[str, ...]]:
+    """Return the input model with the requested effect alone, and where the effect is removed.
 
     Parameters
     ----------
     answer : Answer
-        Of the row.
+        Of the row that has the effect.
     request : EffectRequest
+    effect : FoundEffect
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
     """
+    base, placed = parts_of(answer.fits, answer.fitted)
+    model = model_at(answer.design, base, [
+        each for each in placed if each.effect.name == request.name])
+    known = {each.name: estimate_present(answer.fits, answer.fitted, each)
+             for each in model.effects if each.name != request.name
+             and isinstance(each, (DriveEffect, StructureEffect))
+             and each.name in (answer.design.given.values.get('effects.active') or ())}
+    gone = _gone(answer, request, effect)
+    return _without(_with_uncertainties(model, {**known, request.name: effect.parameters}),
+                    request.name, gone), gone
 
-    answer: Answer
-    request: EffectRequest
 
-    @cached_property
-    def effect(self) -> FoundEffect:
-        """The requested effect of the row, with its values and its held-out errors."""
-        return next(effect for effect in self.answer.effects if effect.name == self.request.name)
+@outside_cost('adopt removes an effect of the model of which the recordings show none')
+def _gone(answer: Answer, request: EffectRequest, found: FoundEffect) -> tuple[str, ...]:
+    """Return where the input model has the effect and the recordings show none of it.
 
-    @cached_property
-    def model(self) -> DriveModel:
-        """The model with the effect alone; other effects of the row are left out.
-
-        Raises
-        ------
-        ModelError
-            For values that no model may have.
-        """
-        answer, name = self.answer, self.request.name
-        base, placed = parts_of(answer.fits, answer.fitted)
-        model = with_widths(model_at(answer.design, base, [
-            effect for effect in placed if effect.effect.name == name]),
-            answer.design, answer.widths)
-        known = {effect.name: estimate_present(answer.fits, answer.fitted, effect)
-                 for effect in model.effects if effect.name != name
-                 and isinstance(effect, (DriveEffect, StructureEffect))
-                 and answer.design.given.values.get('effects.active')
-                 and effect.name in answer.design.given.values['effects.active']}
-        return _without(_with_uncertainties(model, {**known, name: self.effect.parameters}),
-                        name, self.gone)
-
-    @property
-    def calibrations(self) -> tuple[Calibration, ...]:
-        """Numbers of the model that move within their tolerances."""
-        answer = self.answer
-        return tuple(number for number in moved_numbers(answer.fits, answer.fitted, answer.widths)
-                     if number.after != number.before)
-
-    @property
-    def parameters(self) -> dict[str, Estimate]:
-        """Values as the model file has them, with the uncertainties of the diagnosis."""
-        values, prefix = self.model.values, f'effects.{self.request.name}.'
-        return {key: replace(estimate, value=float(values[prefix + key]))
-                for key, estimate in self.effect.parameters.items() if prefix + key in values}
-
-    @cached_property
-    @outside_cost('adopt removes an effect of the model of which the recordings show none')
-    def gone(self) -> tuple[str, ...]:
-        """Where the input model has the effect and the recordings leave none of it.
-
-        As the beginnings of keys: `drive.`, `link.`, or '' for all of it.
-        """
-        effect, design = self.request.effect, self.answer.design
-        candidate = next(c for c in self.answer.fitted.effects if c.name == effect.name)
-        sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
-            p.name.endswith('mass') or not issubclass(effect, AddedBody))}
-        found = []
-        for component in candidate.components:
-            if design.present(effect, component.drive) is None:
-                continue
-            places = {name.rpartition('.')[0] for name in component.names
-                      if effect.is_of_one_place}
-            prefix = (f'{design.drives[component.drive]}.' if component.drive is not None
-                      else ''.join(f'{place}.' for place in places))
-            mine = [number for key, number in self.effect.parameters.items()
-                    if key.startswith(prefix) and effect.place_and_parameter(key)[1] in sizes]
-            if mine and all(abs(number.value) <= SURE * number.std for number in mine):
-                found.append(prefix)
-        return tuple(found)
+    As the beginnings of keys: `drive.`, `link.`, or '' for all of it.
+    """
+    effect, design = request.effect, answer.design
+    candidate = next(c for c in answer.fitted.effects if c.name == effect.name)
+    sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
+        p.name.endswith('mass') or not issubclass(effect, AddedBody))}
+    prefixes = []
+    for component in candidate.components:
+        if design.present(effect, component.drive) is None:
+            continue
+        places = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
+        prefix = (f'{design.drives[component.drive]}.' if component.drive is not None
+                  else ''.join(f'{place}.' for place in places))
+        mine = [number for key, number in found.parameters.items()
+                if key.startswith(prefix) and effect.place_and_parameter(key)[1] in sizes]
+        if mine and all(abs(number.value) <= SURE * number.std for number in mine):
+            prefixes.append(prefix)
+    return tuple(prefixes)
 
 
 def _with_uncertainties(model: DriveModel, known: Mapping[str, Mapping[str, Estimate]],

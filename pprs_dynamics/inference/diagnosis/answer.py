@@ -21,10 +21,8 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedSet,
     RivalEffect,
 )
-from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.quantities import listed, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
-from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import rms
@@ -60,7 +58,6 @@ from pprs_dynamics.inference.search.held_out import (
     predictive_gain,
 )
 from pprs_dynamics.inference.search.noise_floors import noise_at_most, noise_floors
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -99,12 +96,10 @@ class Answer:
     def __init__(self, table: ModelTable, row: Row, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
         self.table, self.row, self.validate, self.decisions = table, row, validate, decisions
-        self.fits, self.fitted, self.widths = row.fits, row.fitted, dict[int, float]()
+        self.fits, self.fitted = row.fits, row.fitted
         self.design, self.given = row.fits.design, table.first.design.residuals
         self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
         self.remaining = self._remaining()
-        if not row.fitted.is_dated:
-            self._fit_widths()
         # What a row leaves without an effect that was found no finding is no noise.
         fits, fitted = (self.fits, self.fitted) if row is table.best else (
             table.best.fits, table.best.fitted)
@@ -129,24 +124,6 @@ class Answer:
             remaining[:, d] -= series.open_forces(remaining[:, d])
         return remaining
 
-    @outside_cost('widths of reversal are refitted if the error falls with them')
-    def _fit_widths(self) -> None:
-        """Fit the velocities within which friction reverses, where the error falls with them."""
-        widths = estimate_widths(self.fits, self.fitted)
-        if not widths:
-            return
-        before = vars(self).copy()
-        base, effects = parts_of(self.fits, self.fitted)
-        model = with_widths(self.adopted, self.design, widths)
-        self.fits = FittedSets(self.design.around(OperatingPoint(model, base, effects), alone=True),
-                               self.fits.decisions, self.fits.regression.error_scale)
-        self.fitted = self.fits.refined(self.fits.evaluate(self.fitted.candidates))
-        self.design, self.widths = self.fits.design, widths
-        self.adopted = with_widths(model_of(self.fits, self.fitted), self.design, widths)
-        self.remaining = self._remaining()
-        if root_mean_square(self.remaining) > root_mean_square(before['remaining']):
-            vars(self).update(before)
-
     def force(self, candidate: EffectCandidate | UnknownCandidate) -> Array:
         """Return what a candidate of the row contributes, (M, D) [N]."""
         return self.fits.components.force(self.fitted, candidate, self.remaining.shape)
@@ -169,7 +146,7 @@ class Answer:
                      for effect in effects)
         verdict = ('unknown' if unconfirmed or depends or above or little or drifts
                    else 'ambiguous' if rivals else 'effect' if effects else 'adequate')
-        moved = [number for number in calibrations(self.fits, self.fitted, self.widths)
+        moved = [number for number in calibrations(self.fits, self.fitted)
                  if abs(number.after - number.before) > self.decisions.sure * number.std]
         refit = root_mean_square(self.remaining + sum(
             (effect.force for effect in effects), np.zeros_like(self.remaining)))
@@ -188,10 +165,11 @@ class Answer:
     @cached_property
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects of the row; those whose force removes most of the error first."""
-        found = [self._effect(candidate) for candidate in Row(self.fits, self.fitted).effects]
+        found = [self.found(candidate) for candidate in Row(self.fits, self.fitted).effects]
         return tuple(sorted(found, key=lambda effect: -effect.share))
 
-    def _effect(self, candidate: EffectCandidate) -> FoundEffect:
+    def found(self, candidate: EffectCandidate) -> FoundEffect:
+        """Return an effect of the row with its values and errors."""
         fits, fitted, force = self.fits, self.fitted, self.force(candidate)
         estimates = averaged(estimate(fits, fitted, candidate, fitted.is_dated),
                              self._nearly(candidate))
@@ -346,7 +324,7 @@ class Answer:
                     evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
 
     def _depends_on(self) -> tuple[Statement, ...]:
-        """Return patterns of no catalogue, and drives whose slow noise exceeds that of others."""
+        """Return patterns of no catalogue."""
         statements = []
         by_drive = {pattern.d: pattern for pattern in self.table.patterns}
         for candidate in self.fitted.unknowns:
@@ -355,10 +333,6 @@ class Answer:
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
                     by_drive[d], candidate, self.fitted.fit.of(block), evidence))
-        statements += [
-            statement for name, statement in levels(
-                self.fits.regression.residuals, dict(self.noise), self.decisions).items()
-            if statement.amplitude > self._form_error[self.drives.index(name)]]
         return tuple(sorted(statements, key=lambda statement: -statement.evidence))
 
     # Queries on the table
@@ -455,30 +429,15 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     table = diagnosis.selection
     if table is None:
         return ()
+    reported = {c.name: c.placed_name for c in table.best.effects}
     found = []
-    adopted = {c.name: c.placed_name for c in table.best.effects}
-    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
-                     for name in names[1:]):
-        row = next((row for row in table.rows
-                    if any(name in (c.name, c.placed_name) for c in row.effects)
-                    and adopted[of] not in row.placed_names), None)
-        if row is None:
-            continue
-        candidate = next(c for c in row.effects if name in (c.name, c.placed_name))
-        remaining = linear_residual(row.fits, row.fitted)
-        found.append(RivalEffect(
-            candidate.effect, row.fits.design.named(candidate.drives),
-            estimate(row.fits, row.fitted, candidate).parameters,
-            row.fits.components.force(row.fitted, candidate, remaining.shape), of,
-            linear_error(row.fits, row.fitted), _held_out_error(row, validate),
-            row.cost - table.best.cost, remaining))
+    for of, *names in diagnosis.indistinguishable:
+        for name in names:
+            row = next(row for row in table.rows if reported[of] not in row.placed_names
+                       and any(name in (c.name, c.placed_name) for c in row.effects))
+            answer = Answer(table, row, validate, diagnosis.decisions)
+            candidate = next(c for c in answer.fitted.effects
+                             if name in (c.name, c.placed_name))
+            found.append(RivalEffect(answer.found(candidate), of, row.cost - table.best.cost,
+                                     answer.remaining))
     return tuple(found)
-
-
-def _held_out_error(row: Row, validate: Sequence[Recording]) -> float:
-    if not validate:
-        return hold_out(row.fits, row.fitted).error
-    try:
-        return rms(measure_residuals(model_of(row.fits, row.fitted), validate)[0])
-    except PprsError:
-        return float('nan')

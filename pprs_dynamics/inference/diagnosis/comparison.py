@@ -107,33 +107,6 @@ class DriveComparison:
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Errors of another model on the same recordings, or of the model on another recording.
-
-    Parameters
-    ----------
-    name : str
-        Of its file.
-    drives : mapping of str to float
-        Root of the mean squared error of each drive [N].
-    rms : float
-        Over all drives [N].
-    unit : str
-    """
-
-    name: str
-    drives: Mapping[str, float]
-    rms: float
-    unit: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return name and errors."""
-        return {'name': self.name, 'drives': {name: {'rms': finite(value)}
-                                              for name, value in self.drives.items()},
-                'overall': {'rms': finite(self.rms)}}
-
-
-@dataclass(frozen=True)
 class Comparison:
     """All drives, and what they pool to.
 
@@ -250,8 +223,7 @@ def _compare_drive(
     if floor is not None and noise is not None and noise.period == residuals.period:
         # What no pattern explains is an upper bound of the noise.
         floor = noise_at_most(floor, noise.rms)
-    most = max((statement.mean_square for statement in findings.statements
-                if statement.kind != 'level'), default=0.0)
+    most = max((statement.mean_square for statement in findings.statements), default=0.0)
     parts = [root_mean_square(part[known, index] - part[known, index].mean())
              for part in residuals.parts.values()]
     return DriveComparison(

@@ -50,8 +50,8 @@ class RankedSet:
 
 
 @dataclass(frozen=True)
-class FittedEffect:
-    """An effect with what a fit says of it.
+class FoundEffect:
+    """An effect of a row of the table.
 
     Parameters
     ----------
@@ -61,35 +61,6 @@ class FittedEffect:
     parameters : dict of str to Estimate
     force : (M, D) array
         What it contributes [N].
-    """
-
-    effect: type[CatalogueEffect]
-    drives: Drives
-    parameters: dict[str, Estimate]
-    force: Array
-
-    @property
-    def name(self) -> str:
-        """Name in the catalogue."""
-        return self.effect.name
-
-    @property
-    def when(self) -> str:
-        """When it is there, as the end of a clause; '' where that is all the time."""
-        return ''
-
-    @property
-    def places(self) -> tuple[tuple[str, ...], ...]:
-        """Links or joints that it is on, each with those that no motion separates from it."""
-        return self.effect.places_of(self.parameters)
-
-
-@dataclass(frozen=True)
-class FoundEffect(FittedEffect):
-    """An effect that the recordings call for.
-
-    Parameters
-    ----------
     evidence : float
         Cost of the best set without it, less that of the best set.
     error_before, error_after : float
@@ -117,6 +88,10 @@ class FoundEffect(FittedEffect):
         First moments of added bodies: see `Estimates`.
     """
 
+    effect: type[CatalogueEffect]
+    drives: Drives
+    parameters: dict[str, Estimate]
+    force: Array
     evidence: float
     error_before: float
     error_after: float
@@ -130,6 +105,16 @@ class FoundEffect(FittedEffect):
     in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None
     moments: Mapping[str, Estimate] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Links or joints that it is on, each with those that no motion separates from it."""
+        return self.effect.places_of(self.parameters)
 
     @property
     def certainty(self) -> float:
@@ -169,26 +154,23 @@ class FoundEffect(FittedEffect):
 
 
 @dataclass(frozen=True)
-class RivalEffect(FittedEffect):
-    """An effect that would explain the recordings about as well as an adopted one.
+class RivalEffect:
+    """An effect that would explain the recordings about as well as a reported one.
 
     Parameters
     ----------
+    found : FoundEffect
+        In the row of the rival.
     of : str
-        The adopted effect.
-    error_after : float
-        With it in place of the adopted one [N].
-    held_out_after : float
-        The same on held-out data [N]; NaN where it is no model that can be evaluated there.
+        The reported effect.
     cost : float
-        Of its set, above the best one's.
+        Of its row, above that of the reported row.
     remaining : (M, D) array
-        Residual of its set [N].
+        Residual of its row [N].
     """
 
+    found: FoundEffect
     of: str
-    error_after: float
-    held_out_after: float
     cost: float
     remaining: Array
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -23,7 +22,7 @@ from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.parallel import each
@@ -87,41 +86,8 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
         return found
 
     drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
-    for name, statement in levels(thin, {
-            name: findings.noise for name, findings in drives.items()}, DECISIONS).items():
-        drives[name] = replace(drives[name], statements=(*drives[name].statements, statement))
-    ranked = sorted((statement for findings in drives.values()
-                     for statement in findings.statements), key=lambda one: -one.evidence)
-    return Localisation(tuple(ranked), drives)
-
-
-@outside_cost('slow noise three times that of the other drives: `unknown`')
-def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
-           decisions: Decisions) -> dict[str, Statement]:
-    """Return statements on drives whose slow noise is far above its peers'.
-
-    Against the same drive's fast noise, so that drives of different sizes are compared.
-    """
-    known = {name: noise for name, noise in noises.items()
-             if noise is not None and noise.fast_rms > 0}
-    slow = {name: noise.rms / noise.fast_rms for name, noise in known.items()}
-    found = {}
-    for name, ratio in slow.items():
-        peers, noise = [other for key, other in slow.items() if key != name], known[name]
-        if len(peers) < 2:
-            continue
-        usual = float(np.median(peers))
-        if ratio > decisions.level_ratio * usual:
-            square = (ratio ** 2 - usual ** 2) * noise.fast_rms ** 2
-            share = square / noise.rms ** 2
-            found[name] = Statement(
-                name, 'time', None, float(min(share, 1.0)), 1.0,
-                f'{name}: its error drifts by '
-                f'{in_unit(float(np.sqrt(square)), residuals.units_of(name).effort, 2)} rms, with '
-                f'no pattern that stands out: beside its fast noise that is '
-                f'{plain(ratio / usual, 2)} times as much as on the other drives',
-                0.0, 'level', float(np.sqrt(square)), float(square))
-    return found
+    every = [statement for findings in drives.values() for statement in findings.statements]
+    return Localisation(tuple(sorted(every, key=lambda one: -one.evidence)), drives)
 
 
 def _search(residuals: Residuals, drive: int) -> DriveFindings:

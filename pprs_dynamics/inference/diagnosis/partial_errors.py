@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What to draw: the error as effects come in, and with one of them taken out again."""
+"""What to draw of an effect: the error with it taken out of the model again."""
 
 from __future__ import annotations
 
@@ -9,67 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect, RivalEffect
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
 from pprs_dynamics.inference.residuals.profiles import Profile, bin_edges, bin_of, error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
-# The model's own numbers that move without changing the error by this share are no step.
-LEAST_STEP = 1e-3
 FINE_BINS = 24
 # Of the variance of an effect, what means over bins of a variable must tell to draw it along it.
 TELLING = 0.5
 SPAN = 5.0  # [s], of what is drawn over time
-
-
-@dataclass(frozen=True)
-class ErrorStep:
-    """The error once something more is in the model.
-
-    Parameters
-    ----------
-    label : str
-        What came in.
-    overall : float
-        Root of the mean square over samples and drives [N].
-    drives : (D,) array
-        The same by drive [N]; NaN where nothing was measured.
-    """
-
-    label: str
-    overall: float
-    drives: Array
-
-
-def error_steps(diagnosis: Diagnosis, after: Residuals) -> tuple[ErrorStep, ...]:
-    """Return the steps, first the model as given, last the model with everything.
-
-    Both ends are what a comparison with these models gives. In between, parameters are those of
-    the last fit: a step shows what one effect adds to those before it.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    after : Residuals
-        Of `diagnosis.adopted` on the same recordings.
-    """
-    effects = diagnosis.effects
-    missing = sum((effect.force for effect in effects), np.zeros_like(after.error))
-    steps = [_step('model as given', diagnosis.residuals.error)]
-    refitted = _step('its own numbers', after.error + missing)
-    if abs(refitted.overall / steps[0].overall - 1) > LEAST_STEP:
-        steps.append(refitted)
-    for effect in effects:
-        missing = missing - effect.force
-        steps.append(_step(effect.name, after.error + missing))
-    return tuple(steps)
-
-
-def _step(label: str, error: Array) -> ErrorStep:
-    return ErrorStep(label, root_mean_square(error),
-                     np.array([root_mean_square(of_drive) for of_drive in error.T]))
 
 
 @dataclass(frozen=True)
@@ -100,12 +50,15 @@ class PartialResidual:
     span: slice
 
 
-def partial_residual(diagnosis: Diagnosis, effect: FittedEffect) -> PartialResidual:
-    """Return what the recordings say of one effect when all others are in the model."""
+def partial_residual(diagnosis: Diagnosis, effect: FoundEffect, remaining: Array,
+                     ) -> PartialResidual:
+    """Return what the recordings say of one effect when all others are in the model.
+
+    `remaining` is the residual of the row of the effect, (M, D) [N].
+    """
     drive = int(np.argmax(np.sqrt(np.mean(effect.force ** 2, axis=0))))
     force = effect.force[:, drive]
-    left = effect.remaining if isinstance(effect, RivalEffect) else diagnosis.remaining
-    without = _with_error(diagnosis.residuals, left + effect.force)
+    without = with_error(diagnosis.residuals, remaining + effect.force)
     variable, share = _most_telling(without, drive, force)
     profile, fitted = None, np.zeros(0)
     noise = diagnosis.noise.get(without.drives[drive])
@@ -119,12 +72,8 @@ def partial_residual(diagnosis: Diagnosis, effect: FittedEffect) -> PartialResid
                            _largest_span(without, force))
 
 
-def remaining_residuals(diagnosis: Diagnosis) -> Residuals:
-    """Return the residuals in which what remains is all of the error."""
-    return _with_error(diagnosis.residuals, diagnosis.remaining)
-
-
-def _with_error(residuals: Residuals, error: Array) -> Residuals:
+def with_error(residuals: Residuals, error: Array) -> Residuals:
+    """Return residuals with another error (M, D) [N] of the same model."""
     return replace(residuals, measured=residuals.model + error, parts={})
 
 

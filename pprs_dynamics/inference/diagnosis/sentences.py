@@ -13,7 +13,6 @@ from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.found_effects import (
     Drives,
-    FittedEffect,
     FoundEffect,
     RankedSet,
     RivalEffect,
@@ -338,7 +337,7 @@ def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
 # Findings
 
 
-def _title(diagnosis: Diagnosis, effect: FittedEffect) -> str:
+def _title(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     """Return the effect and where it is; of links that move alike all."""
     places = listed([listed(names, 'or') for names in effect.places])
     return (f'{effect.name} on {places}' if places else
@@ -371,19 +370,19 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    card, unit = rival.effect.card, diagnosis.residuals.unit
-    title = _title(diagnosis, rival)
-    held_out = '' if isnan(rival.held_out_after) else (
-        f', and {in_unit(rival.held_out_after, unit)} on held-out data')
+    found, unit = rival.found, diagnosis.residuals.unit
+    card, title = found.effect.card, _title(diagnosis, found)
+    held_out = '' if isnan(found.held_out_after) else (
+        f', and {in_unit(found.held_out_after, unit)} on held-out data')
     return Finding(
         f'or {title}', f'{title} explains the data about as well as {rival.of}: '
-        f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {in_unit(rival.error_after, unit)}{held_out}. '
+        f'{_parameters(diagnosis, found)}.',
+        f'With it the error is {in_unit(found.error_after, unit)}{held_out}. '
         f'The set costs {plain(rival.cost, 2)} more than the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
 
-def _parameters(diagnosis: Diagnosis, effect: FittedEffect) -> str:
+def _parameters(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     """Return the fitted values; of more than two drives the least and the largest."""
     fitted = _fitted(diagnosis, effect)
     count = len({value.drive for value in fitted})
@@ -400,19 +399,18 @@ def _parameters(diagnosis: Diagnosis, effect: FittedEffect) -> str:
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, effect: FittedEffect) -> list[FittedValue]:
+def _fitted(diagnosis: Diagnosis, effect: FoundEffect) -> list[FittedValue]:
     """Return the fitted parameters of an effect that are not 0, in the order of drives."""
     known = {parameter.name: parameter for parameter in effect.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
     values = []
     for key, estimate in effect.parameters.items():
         drive, name = effect.effect.place_and_parameter(key)
-        given = effect.in_model.get(key) if isinstance(effect, FoundEffect) else None
+        given = effect.in_model.get(key)
         if estimate.value or given:
             values.append(FittedValue(effect.name, drive, known[name], estimate, given))
-    if isinstance(effect, FoundEffect):
-        values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
-                   for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
+    values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
+               for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
     return sorted(values, key=lambda value: order.index(value.drive))
 
 

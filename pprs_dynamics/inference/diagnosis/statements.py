@@ -66,7 +66,7 @@ SHAPES = {
     'growth': 'a curve', 'directed_growth': 'a curve that changes sign with the direction',
     'one_way': 'a curve in one direction only', 'friction': 'a step at reversals',
     'fading': 'a step at reversals that fades with speed', 'fast': 'a curve at high speed',
-    'bump': 'a bump', 'level': 'a slow drift',
+    'bump': 'a bump',
     'ripple': 'a wave', 'line': 'a vibration at one frequency',
 }
 
@@ -96,7 +96,7 @@ class Statement:
     evidence : float
         By which the cost rises without it.
     kind : str
-        Of pattern, see `patterns.Pattern`; 'level' for noise far above that of the other drives.
+        Of pattern, see `patterns.Pattern`.
     amplitude : float
         Size of the pattern [N].
     mean_square : float
@@ -270,9 +270,7 @@ def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str
     what = (f'The error of {drives}, {place_of(first.variable)}, has the form of no effect of the '
             f'catalogue. Its form is {shape}: {texts}.')
     evidence = max(statement.evidence for statement in group)
-    why = ('Its noise is compared with that of the other drives, which move alike.'
-           if first.kind == 'level' else
-           f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and every effect '
+    why = (f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and every effect '
            'of the catalogue explains it worse.')
     cause, confirm = LEADS[_lead(first.variable)]
     return f'unknown {place_on(group)}', what, why, sentence(cause), sentence(confirm)

@@ -50,9 +50,6 @@ class Decisions:
     # The same for the input model's own friction, beside a further candidate. Load-dependent
     # friction is computed from frictionless loads, 1 to 2 % off.
     own_form_share: float = 0.02
-    # Share of an idealised effect that its lack of fit may put into an exact one. Masses, gravity
-    # and sensors are exact: little else looks like them.
-    exact_share: float = 0.02
     # Error that a drive may keep over its noise, beside what forms of effects leave. What stands
     # out of the noise to the eye must be reported.
     left_ratio: float = 1.5
@@ -67,9 +64,6 @@ class Decisions:
     # How nearly an effect must pay to be listed as a suspect [deviance]. Odds of 12 to 1 against
     # it: more noise of the same sort would turn them.
     suspect_margin: float = 5.0
-    # A drive's slow noise over its fast noise, against its peers', above which the verdict is
-    # unknown. Robots have like drives; a factor of 3 in rms is an order of magnitude in power.
-    level_ratio: float = 3.0
     # Periods of a line within the longest stretch, below which it is a drift. Slow noise has
     # bumps of one or two periods.
     line_periods: float = 3.0
