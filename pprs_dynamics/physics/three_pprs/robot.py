@@ -34,7 +34,7 @@ from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS, DriveFriction
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveFriction
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
@@ -86,12 +86,12 @@ class ClosedForm:
         In addition to bodies and gravity.
     joints : Joints
         Friction of the passive joints.
-    table : (closed_form.EVERYTHING, N, 6) array, optional
+    table : (EVERYTHING, N, 6) array, optional
         The results, where they are known.
     """
 
     def __init__(self, robot: ThreePprs, motion: PlatformMotion,
-                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS[0],
+                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS_JOINTS,
                  table: Array | None = None) -> None:
         self.robot, self.motion, self.load = robot, motion, load
         self.is_regular = True
@@ -102,9 +102,9 @@ class ClosedForm:
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
             table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+            parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
             self.is_regular = evaluate(
-                closed_form.forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
-                                       motion.rows, loads, table) < 0
+                closed_form.forces_kernel, parameters, motion.rows, loads, table) < 0
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
