@@ -19,7 +19,13 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.mechanism.closures import ROWS, Closing, Mobility
+from pprs_dynamics.physics.mechanism.closures import (
+    ROWS,
+    Closing,
+    Mobility,
+    with_actuated_coordinates,
+    with_elimination_order,
+)
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -33,10 +39,6 @@ from pprs_dynamics.physics.mechanism.description import (
     Loop,
     inertial_in,
     moved_along,
-)
-from pprs_dynamics.physics.mechanism.elimination import (
-    with_actuated_coordinates,
-    with_elimination_order,
 )
 from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
