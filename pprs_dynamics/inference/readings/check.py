@@ -126,7 +126,7 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
         # Angles that explain the efforts well are in the right unit, whatever limits say.
         mistakes += _of_strokes(model, recording, search.strokes,
                                 search.plain_left > table.GOOD_FIT)
-    if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
+    if not kinds & {'position_unit', 'position_sign'}:
         mistakes += _of_velocities(model, recording, excerpts.get(
             1.0 if best is None else best.time_unit))
     for last in (find_changed_efforts(model, recording, excerpts.get(1.0)),
@@ -156,7 +156,7 @@ class Search:
             table.MASSES)
         self.plain_left = 1.0  # residual of the plain reading
         self.fits: list[Fit] = []
-        self._parts: dict[tuple[float, bytes, bytes, bool], Parts | None] = {}
+        self._parts: dict[tuple[float, bytes, bytes], Parts | None] = {}
         self.strokes = self._strokes()
 
     def _strokes(self) -> tuple[Array, Array]:
@@ -245,7 +245,7 @@ class Search:
         if excerpt is None or (reading.kind and not self._possible(reading, excerpt)):
             return None
         offset = np.asarray(reading.offset, float)
-        key = unit, reading.position.tobytes(), offset.tobytes(), reading.backwards
+        key = unit, reading.position.tobytes(), offset.tobytes()
         if key not in self._parts:
             self._parts[key] = parts_of(self.model, excerpt, reading, in_pieces)
         parts = self._parts[key]

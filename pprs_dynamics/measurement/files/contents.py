@@ -80,7 +80,7 @@ def _joints(bag: Bag) -> dict[str, dict[str, set[str]]]:
     for topic, kind, messages in _topics(bag, (JOINT_STATE, *CONTROLLER_TYPES)):
         of_topic = found.setdefault(topic, {})
         for message in messages:
-            for joint, quantity, value, _ in states_of(message, kind):
+            for joint, quantity, value, _ in states_of(message, kind, topic):
                 if np.isfinite(value):
                     of_topic.setdefault(joint, set()).add(quantity)
     return {topic: joints for topic, joints in found.items() if joints}

@@ -5,9 +5,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -53,46 +52,38 @@ class NoModelError(PprsError):
             'which is connected; -p demo:=true takes the paper\'s robot, for demonstrations')
 
 
-class Followed(ABC, Generic[Checked]):
-    """Parameters of a running node: what they mean is checked before they change, and then applied.
+def follow(node: Node, validate: Callable[[list[Parameter]], Checked],
+           apply: Callable[[Checked, list[Parameter]], None]) -> Checked:
+    """Check changes of a running node's parameters, bring them into force, and return the first.
 
     Parameters
     ----------
     node : Node
-    declared : iterable of NodeParameter
-        The node's own parameters, declared already.
+    validate : callable
+        Returns what the parameters mean with some of them changed, or raises PprsError.
+    apply : callable
+        Called with what was checked, and nothing else, once the parameters have changed.
     """
+    checked = [validate([])]
 
-    def __init__(self, node: Node, declared: Iterable[NodeParameter]) -> None:
-        self._node, self._declared = node, tuple(declared)
-        self._checked = self._validated(())
-        node.add_on_set_parameters_callback(self.check)
-        node.add_post_set_parameters_callback(self._after_change)
-
-    @abstractmethod
-    def _validated(self, changes: Iterable[Parameter]) -> Checked:
-        """Return what the parameters mean with some of them changed, or raise PprsError."""
-
-    @abstractmethod
-    def _apply(self, checked: Checked, changes: Iterable[Parameter]) -> None:
-        """Bring into force what was checked."""
-
-    def check(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether the parameters would be valid with some of them changed, and why not."""
+    def check(changes: list[Parameter]) -> SetParametersResult:
         if not are_of_topics(changes):
             try:
-                self._checked = self._validated(changes)
+                checked[0] = validate(changes)
             except PprsError as error:
                 return SetParametersResult(successful=False, reason=with_hint(error))
         return SetParametersResult(successful=True)
 
-    def _after_change(self, changes: list[Parameter]) -> None:
-        # What was checked, and nothing else, comes into force.
+    def changed(changes: list[Parameter]) -> None:
         if not are_of_topics(changes):
-            self._apply(self._checked, changes)
+            apply(checked[0], changes)
+
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(changed)
+    return checked[0]
 
 
-class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
+class ModelParameters:
     """Declares a node's own parameters and those of a model, and follows their changes.
 
     Parameters
@@ -135,8 +126,8 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
         given = overrides(node)
         taken_from_paper = declare_model(node, arguments)
         self._stays: dict[str, Any] = {}
-        super().__init__(node, parameters)
-        self.model, self.node_values = self._checked
+        self._node, self._declared = node, parameters
+        self.model, self.node_values = follow(node, self._validated, self._apply)
         # Whatever is connected would be driven by the forces of another robot.
         if not self.node_values[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())

@@ -151,16 +151,17 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
-    for file in FILES:
-        if isinstance(given.get(file), str) and given[file]:
-            given[file] = str(located(given[file], folder_of(file, arguments)))
+    for key in FILES:
+        if isinstance(given.get(key), str) and given[key]:
+            given[key] = str(located(given[key], folder_of(given[key], arguments)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
-    for name, key in keys_of(given).items():
-        value = given.get(name, defaults.get(name, key.default))
+    for name, entry in keys_of(given).items():
+        value = given.get(name, defaults.get(name, entry.default))
         if value is None and name not in given:
-            raise ModelError(name, MISSING, key.rule)
-        _declare(node, key, key.check(() if value is None and key.may_be_empty else value))
+            raise ModelError(name, MISSING, entry.rule)
+        _declare(node, entry, entry.check(
+            () if value is None and entry.may_be_empty else value))
     added = {name: value for name, value in given.items() if value is not None}
     for name, value in {ACTIVE: [], **added}.items():
         # The ledger is for `pprs history`: a page of numbers that no node reads.
