@@ -21,7 +21,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import (
-    ELEMENT,
     KINDS,
     ArrayTable,
     open_arrays,
@@ -81,12 +80,6 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
 def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
     """Return a table by its first bytes; see `CsvTable.open`."""
     return open_arrays(path) or CsvTable.open(path, decimal, likely)
-
-
-def read_column(path: Path) -> Array:
-    """Return the first column of a table without a header, (N,)."""
-    column: Array = open_table(path).read([1])[0]
-    return column
 
 
 def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
@@ -292,13 +285,10 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
                   for joint, drive in zip(joints, drives.names, strict=True)
                   if quantity in columns.drives[drive].names}
         time = None if shared is not None else _time_column(table, columns)
-        if _is_one_column(table):
-            read, series = {}, _in_turn(table, chosen)
-        else:
-            _require(table, list(chosen.values()))
-            wanted = [*([] if time is None else [time]), *chosen.values()]
-            read = dict(zip(wanted, table.read(wanted, progress), strict=True))
-            series = {joint: read[column] for joint, column in chosen.items()}
+        _require(table, list(chosen.values()))
+        wanted = [*([] if time is None else [time]), *chosen.values()]
+        read = dict(zip(wanted, table.read(wanted, progress), strict=True))
+        series = {joint: read[column] for joint, column in chosen.items()}
         count = len(next(iter(series.values()), ()))
         if shared is not None and count != len(shared):
             raise UnreadableFileError(file, f'it has {counted(count, "row")}, but '
@@ -315,23 +305,6 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
         arrays.update({(joint, quantity): values for joint, values in series.items()})
     assert stamps is not None
     return Samples.of_columns(joints, stamps, arrays, _source(path, columns), tuple(told), epoch)
-
-
-def _is_one_column(table: Table) -> bool:
-    return isinstance(table, CsvTable) and table.count == 1 and not table.names
-
-
-def _in_turn(table: Table, chosen: Mapping[str, Column]) -> dict[str, Array]:
-    """Return numbers that stand below each other in turn, `1[k]` those of each joint."""
-    assert isinstance(table, CsvTable)
-    elements = {joint: ELEMENT.fullmatch(str(column)) for joint, column in chosen.items()}
-    values = table.read([1])[0]
-    count = 1 + max((int(one[2]) for one in elements.values() if one), default=0)
-    if len(values) % count:
-        raise UnreadableFileError(
-            table.path, f'it has one column of {len(values)} numbers, must have as many for each '
-            f'of {count} joints, as 1[0] to 1[{count - 1}] say')
-    return {joint: values[int(one[2]) if one else 0::count] for joint, one in elements.items()}
 
 
 def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
