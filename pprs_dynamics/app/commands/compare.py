@@ -35,5 +35,5 @@ def run(options: argparse.Namespace) -> int:
     if options.mcap:
         with staged_bar(screen) as progress:
             result.write_bag(options.mcap, progress)
-        screen.print(f'bag: {shown(options.mcap)}')
+        screen.print(f'bag: {shown(options.mcap)}', soft_wrap=True)
     return 0

@@ -19,14 +19,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import elements
 from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
-from pprs_dynamics.physics.mechanism.packed import (
-    length_of,
-    packed_tables,
-    read_loads,
-    read_motion,
-    read_tables,
-    views,
-)
 from pprs_dynamics.physics.mechanism.tree_equations import (
     WARM_STEPS,
     actuator_efforts,
@@ -55,6 +47,12 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     JointFriction,
     Loads,
     Model,
+    length_of,
+    packed_tables,
+    read_loads,
+    read_motion,
+    read_tables,
+    views,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -235,7 +233,8 @@ class Evaluation:
         Returns
         -------
         InverseDynamicsResult or None
-            None where a sample is out of reach or singular: `forward_kinematics` says which.
+            None where a sample is out of reach or singular, which `forward_kinematics` says, and
+            of many samples that are not evaluated by compiled code.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
@@ -269,43 +268,33 @@ class Evaluation:
         arguments = (
             *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
             loads, last[1], last[2], actuators, closed, efforts, stages, warm)
-        loop = compiled_or_none(_evaluate, len(closed))
+        are_few = len(closed) <= TREE_FEW
+        loop = compiled_or_none(_evaluate, len(closed) if are_few or stages & KEPT else 0)
         if loop is not None:
             return int(loop(*arguments))
-        if len(closed) <= TREE_FEW:
+        if are_few:
             try:
                 return _evaluate(*arguments)
             except (ZeroDivisionError, OverflowError, ValueError):
                 pass  # arrays answer with infinities instead
+        if not stages & KEPT:
+            return 0  # arrays keep the rows of all samples
         with np.errstate(all='ignore'):
-            return self._run_on_arrays(given, start, rows, stages, gravity, at_home, inertial,
-                                       loads, friction, actuators, closed, efforts)
+            return self._run_on_arrays(given, start, rows, stages, gravity, inertial, loads)
 
     def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
-                       gravity: Array, at_home: Array, inertial: Array, loads: Array,
-                       friction: JointFriction, actuators: Array, closed: Array,
-                       efforts: Array) -> int:
+                       gravity: Array, inertial: Array, loads: Array) -> int:
         t = self.tables
-        if not stages & KEPT:
-            rows, loads = (np.zeros((len(closed), each.shape[1])) for each in (rows, loads))
         m, o = samples_last(self.motion(rows)), samples_last(views(Loads, self.sizes, loads))
-        q, v, a = np.moveaxis(given, 1, -1)
         if stages & MOTION:
+            q, v, a = np.moveaxis(given, 1, -1)
             if not close_loops(t, m, self.home if start is None else start.T, q):
                 size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             forward_kinematics(t, m, v, a)
-            closed[:] = m.q.T
-            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
-                return 0
         if stages & FORCES:
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            if not stages & KEPT:
-                own = np.moveaxis(efforts, 1, -1)
-                own[TRANSMITTED] = o.efforts
-                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
-                actuator_efforts(actuators, v, a, own)
         return -1
 
 
