@@ -36,8 +36,9 @@ def console(**options: Any) -> Any:
             return super().render_str(plain, *args, **options)
 
         def print(self, *objects: Any, **options: Any) -> None:
-            # Names of files stay whole, so that they can be copied.
-            super().print(*objects, **{'overflow': 'ignore', 'crop': False, **options})
+            # Names of files in a line stay whole, so that they can be copied; frames are wrapped.
+            lines = {'overflow': 'ignore'} if all(isinstance(o, str) for o in objects) else {}
+            super().print(*objects, **{'crop': False, **lines, **options})
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)
