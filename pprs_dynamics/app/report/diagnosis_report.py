@@ -206,7 +206,7 @@ def _finding(number: int, finding: Finding) -> Iterator[Any]:
 
 
 def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
-    """Return lines of text beside their labels."""
+    """Return lines of text, each after its label."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 1))
