@@ -46,7 +46,7 @@ SEARCH = ('inference/test_invariants_of_diagnosis.py', 'inference/test_search.py
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
 TESTS = {
     'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
-    'physics/three_pprs/jacobians.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
+    'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
     'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
     'physics/three_pprs/passive_friction.py': ('physics/test_dynamics.py',),
     'physics/effects/foreign_effects.py': ('physics/test_foreign_effects.py',),

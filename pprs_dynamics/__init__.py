@@ -48,7 +48,6 @@ if TYPE_CHECKING:
         DriveEffect,
         DriveRange,
         DriveSamples,
-        GainEffect,
         MeasurementEffect,
     )
     from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
@@ -62,7 +61,7 @@ if TYPE_CHECKING:
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
            'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
-           'FitResult', 'Forces', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
+           'FitResult', 'Forces', 'HelicalPath', 'JointMotion', 'LimitError',
            'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
            'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
            'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
@@ -87,7 +86,7 @@ _HOMES = {
     'inference.experiments.motion_limits': ('ArmLimits', 'MotionLimits'),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
-        'DriveEffect', 'DriveRange', 'DriveSamples', 'GainEffect', 'MeasurementEffect'),
+        'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),
     'physics.effects.effect': ('Card', 'CatalogueEffect', 'Parameter'),
     'physics.effects.structure_effect': ('StructureEffect',),
     'physics.mechanism.joint_motion': ('JointMotion',),

@@ -11,11 +11,11 @@ effort, and says so (`nonlinear`); the diagnosis needs nothing more. The package
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics import Array, DriveRange, MeasurementEffect, Parameter
+from pprs_dynamics import Array, DriveRange, DriveSamples, MeasurementEffect, Parameter
 
 
 class SensorDeadBand(MeasurementEffect):
@@ -55,12 +55,8 @@ class SensorDeadBand(MeasurementEffect):
         """Return widths from 0.05 to 20 N."""
         return [{'width': float(b)} for b in np.geomspace(0.05, 20.0, 12)]
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
-        """Return the effort that the sensor says, (N, D)."""
-        said = effort.copy()
-        for name, values in self.drives.items():
-            index = list(drives).index(name)
-            F = effort[:, index]
-            said[:, index] = np.sign(F) * np.maximum(np.abs(F) - values['width'], 0.0)
-        return said
+    @classmethod
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
+        """Return the effort that the sensor shows, (N,)."""
+        beyond = np.maximum(np.abs(effort) - parameters['width'], 0.0)
+        return np.sign(effort) * beyond

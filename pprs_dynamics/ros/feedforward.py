@@ -42,10 +42,10 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 from pprs_dynamics.ros.node.clocks import CommandWatchdog
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
@@ -62,7 +62,7 @@ LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last comma
 STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` is 0
 
 
-class FeedforwardNode(ExplainsRefusals, ManagedNode):
+class FeedforwardNode(ManagedNode):
     """Answers every valid trajectory with friction-compensated efforts of the drives.
 
     A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
@@ -72,6 +72,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
+        arguments = arguments_of(options)
         self._log = ThrottledLog(self)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
@@ -79,7 +80,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         parameters = parameters_for(drive_count(self))
-        self._settings = ModelParameters(self, parameters, self._use_settings, drives=True)
+        self._settings = ModelParameters(
+            self, arguments, parameters, self._use_settings, drives=True)
         node_values = self._settings.node_values
         for name, assumed in self._settings.model.assumed_at_start.items():
             self.get_logger().info(f'{name} begins anew: {assumed}')
@@ -97,7 +99,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
-        self._files = files_given(self.arguments)
+        self._files = files_given(arguments)
         self._status = StatusReporter(
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
             hardware_of(self._settings.model), self._refresh)

@@ -33,10 +33,10 @@ from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
 from pprs_dynamics.ros.node.qos import EVERY_MESSAGE, LATCHED, publisher
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
@@ -73,7 +73,7 @@ ENOUGH = 20  # samples in a second, whose share says anything
 LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 
-class MonitorNode(ExplainsRefusals, ManagedNode):
+class MonitorNode(ManagedNode):
     """Publishes what the model says at every measured stamp, and how wrong it is.
 
     Configured, it listens; it compares while it is active, and begins with a stream anew each time.
@@ -81,6 +81,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
+        arguments = arguments_of(options)
         self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._publishers_made: list[Any] = []
@@ -90,7 +91,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             parameters = tuple(
                 replace(parameter, default=ARM_WINDOW) if parameter.name == 'window' else parameter
                 for parameter in PARAMETERS)
-        self._settings = ModelParameters(self, parameters, self._use)
+        self._settings = ModelParameters(self, arguments, parameters, self._use)
         node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)
         self._names = RobotNames.of(self._settings.model, node_values['frame_id'])
@@ -100,7 +101,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(self.arguments)
+        self._files = files_given(arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it

@@ -106,8 +106,6 @@ class PlayTrajectoryNode(Node):
         if self._next == 0 and self._round == 1 and not self._publisher.get_subscription_count():
             return
         now = self.get_clock().now().nanoseconds
-        if not self._beats.is_running:
-            self._beats.start(now)
         # A timer leaves out what it was late for; the stamps behind it would stay late for good.
         for beat in self._beats.due(now):
             self._play(beat)
@@ -143,30 +141,22 @@ class Beats:
     """
 
     def __init__(self, period: float) -> None:
-        self._period = period
-        self._start, self._count = 0, 0
-        self.is_running = False
-
-    def start(self, now: int) -> None:
-        """Begin, with the first moment now [ns]."""
-        self._start, self._count, self.is_running = now, 0, True
+        self._period = round(period)
+        self._next: int | None = None
 
     def due(self, now: int) -> Iterator[int]:
-        """Yield the moments that have come by now [ns].
+        """Yield the moments that have come by now [ns]; the first is now.
 
         After a standstill of more than `LONGEST_CATCH_UP`, and where the clock was set back, the
         stream goes on from now.
         """
-        late = now - self._next
-        if late > LONGEST_CATCH_UP * conversions.NANOSECONDS or late < -2 * self._period:
-            self.start(now)
+        late = 0 if self._next is None else now - self._next
+        if self._next is None or not (
+                -2 * self._period <= late <= LONGEST_CATCH_UP * conversions.NANOSECONDS):
+            self._next = now
         while self._next <= now:
-            moment, self._count = self._next, self._count + 1
-            yield moment
-
-    @property
-    def _next(self) -> int:
-        return self._start + round(self._count * self._period)
+            yield self._next
+            self._next += self._period
 
 
 def _joints(node: Node, values: dict[str, Any], arguments: Sequence[str],

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -21,14 +21,14 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, Followed
+from pprs_dynamics.ros.node.model_parameters import follow
 from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
     declare_node_parameters,
     node_parameter,
 )
-from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
@@ -58,7 +58,7 @@ PARAMETERS = (
     node_parameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
 # What changes while the robot runs: injected effects, and parameters of ROS 2 itself.
-CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
+CHANGEABLE = ('hidden_effects', 'seed', 'hidden_scale')
 OF_ROS = ('use_sim_time', 'start_type_description_service')
 # A node that was stopped for longer than this [s], or whose clock was set back by more, goes on
 # from now instead of catching up or waiting.
@@ -68,7 +68,7 @@ CYCLES_AT_ONCE = 2
 LATE_SHARE = 0.001
 
 
-class SimulatedRobotNode(ExplainsRefusals):
+class SimulatedRobotNode(Node):
     """Publishes joint_states, and follows setpoints with efforts, or efforts alone.
 
     Setpoints are executed at their stamps, interpolated between them; a stamp that has passed is
@@ -79,7 +79,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         node_values = declare_node_parameters(self, PARAMETERS)
-        declare_model(self, self.arguments)
+        declare_model(self, arguments_of(options))
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
         self._model = DriveModel.from_parameters(values)
@@ -107,10 +107,25 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
-        self._settings = InjectedParameters(self, self._robot.plant, self._inject)
+        self._hidden = follow(self, self._validated, self._inject)
 
-    def _inject(self, values: Mapping[str, Any]) -> None:
-        self._robot.plant.inject(values['hidden_effects'], values['seed'], values['hidden_scale'])
+    def _validated(self, changes: list[Parameter]) -> dict[str, Any]:
+        """Return the parameters of injected effects; all others stay as they were at the start."""
+        before, after = current_values(self), current_values(self, changes)
+        for name in (change.name for change in changes):
+            if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
+                raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
+                                 f'robot only {", ".join(CHANGEABLE)} change')
+        values = {each.name: each.check(after.get(each.name)) for each in PARAMETERS
+                  if each.name in CHANGEABLE}
+        self._robot.plant.choices(*(values[name] for name in CHANGEABLE))
+        return values
+
+    def _inject(self, values: dict[str, Any], changes: list[Parameter]) -> None:
+        if values == self._hidden:
+            return
+        self._hidden = values
+        self._robot.plant.inject(*(values[name] for name in CHANGEABLE))
         self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
                                f'hidden effects: {self._injected()}')
 
@@ -203,36 +218,3 @@ def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
     return SimulatedRobot(
         plant, seed=values['seed'], rate=values['rate'], control=control,
         sensors=SensorSettings(values['encoder_resolution'], values['effort_noise']))
-
-
-class InjectedParameters(Followed[dict[str, Any]]):
-    """Follows the parameters of injected effects; all others stay as they were at the start.
-
-    Parameters
-    ----------
-    node : Node
-    plant : Plant
-        Checks the names of effects.
-    use : callable
-        Called with the node's parameters when those of injected effects have changed.
-    """
-
-    def __init__(self, node: Node, plant: Plant, use: Callable[[Mapping[str, Any]], None]) -> None:
-        self._plant, self._use = plant, use
-        super().__init__(node, (each for each in PARAMETERS if each.name in CHANGEABLE))
-        self._values = self._checked
-
-    def _validated(self, changes: Iterable[Parameter]) -> dict[str, Any]:
-        before, after = current_values(self._node), current_values(self._node, changes)
-        for name in (change.name for change in changes):
-            if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
-                raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
-                                 f'robot only {", ".join(CHANGEABLE)} change')
-        values = {each.name: each.check(after.get(each.name)) for each in self._declared}
-        self._plant.choices(values['hidden_effects'], values['seed'], values['hidden_scale'])
-        return values
-
-    def _apply(self, checked: dict[str, Any], changes: Iterable[Parameter]) -> None:
-        if checked != self._values:
-            self._values = checked
-            self._use(checked)

@@ -25,6 +25,7 @@ from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
@@ -35,15 +36,16 @@ from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     SPLINE,
+    TRAJECTORY,
+    RequestReader,
     TrajectoryRequest,
-    read_joint_trajectory,
-    read_trajectory,
+    readers_for,
 )
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
-from pprs_dynamics.ros.node.provenance import files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
@@ -65,24 +67,25 @@ SETTLING = 0.02
 LEFT_AT_MOST = 0.1
 
 
-class TrajectoryProxyNode(ExplainsRefusals):
+class TrajectoryProxyNode(Node):
     """Passes goals on with the efforts that the model says."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
+        arguments = arguments_of(options)
         self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
             replace(parameter, default=SPLINE)
             if parameter.name == 'missing_derivatives' else parameter
             for parameter in parameters_for(drive_count(self)) if parameter.name in SHARED))
-        self._settings = ModelParameters(self, parameters, lambda: None, drives=True)
+        self._settings = ModelParameters(self, arguments, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
                                       hardware_of(self._settings.model), self._refresh)
-        self._files = files_given(self.arguments)
+        self._files = files_given(arguments)
         self._refresh()
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
@@ -237,8 +240,10 @@ class TrajectoryProxyNode(ExplainsRefusals):
             _end_at_rest(goal)
         names = RobotNames.of(model)
         if not (model.moves_joints or goal.trajectory.points):
-            return read_trajectory(goal.multi_dof_trajectory, now, missing, names.frame)
-        request = read_joint_trajectory(goal.trajectory, names.joints, now, missing)
+            return readers_for(model, names)[TRAJECTORY].of_message(
+                goal.multi_dof_trajectory, now, missing)
+        request = RequestReader(JointTrajectory, names.joints).of_message(
+            goal.trajectory, now, missing)
         if model.moves_joints:
             return request
         # Drives' positions: the platform's motion follows from them.

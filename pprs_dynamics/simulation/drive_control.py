@@ -95,8 +95,6 @@ class DriveControl:
     ----------
     notes : list of Note
         One for every change for the worse, not one for every step.
-    saturated_steps : (D,) int array
-        How many steps each drive spent at its limit.
     """
 
     def __init__(self, limits: DriveLimits, weight: Callable[[Array], Array],
@@ -109,7 +107,6 @@ class DriveControl:
         self._delay_line: deque[Array] = deque(
             maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
-        self.saturated_steps = np.zeros(count, dtype=int)
         self._at_limit = np.zeros(count, dtype=bool)
         self._nothing = np.zeros(count)
         self.start(self._nothing)
@@ -230,7 +227,6 @@ class DriveControl:
         effort: Array = np.minimum(np.maximum(wanted, -limits.efforts), limits.efforts)
         over = effort != wanted
         if over.any():
-            self.saturated_steps += over
             for i in np.flatnonzero(over & ~self._at_limit):
                 unit = limits.effort_units[i]
                 self._note(now, 'SATURATED', f'{limits.drives[i]} would need {wanted[i]:.4g} '

@@ -48,7 +48,7 @@ from pprs_dynamics.simulation.injection import (
     require_tool,
 )
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.temperatures import Climate
+from pprs_dynamics.simulation.temperatures import draw_temperatures
 
 LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step
@@ -99,7 +99,7 @@ class Plant(Injecting):
     last_acceleration : (D,) array
         Of the last step: loads that friction follows are those of it.
     injected : list of dict
-        Name, drives, parameters and form of each injected effect.
+        Name, drives and parameters of each injected effect.
     largest : (D,) array
         Largest efforts of an excitation [N, N m].
     inertia : (D,) array
@@ -200,14 +200,14 @@ class Plant(Injecting):
         model, motion, form = self.model, self._nominal, OF_MOMENT[name]
         chosen = self.given or [one_able_joint(name, model, motion, random)]
         assert motion.time is not None
-        temperature = Climate.draw(random, len(model.drives)).along(motion.time, motion.velocity)
+        temperature = draw_temperatures(random, motion.time, motion.velocity)
         parameters = {}
         for j in chosen:
             moment = JointMoment.along(motion, j, self._efforts[:, j], self.largest[j],
                                        model.gear_ratios[j], temperature)
             drawn = parameters[model.drives[j]] = draw_form(form, random, moment, self.scale)
             self._pushes.append((j, name, drawn, moment))
-        return Injected([*parameters], parameters, form.form)
+        return [*parameters], parameters
 
     def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
         """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""

@@ -24,7 +24,8 @@ MASS = 4.0
 def test_the_columns_about_a_centre_are_exact_for_a_body_there(tmp_path: Path) -> None:
     model = DriveModel.load(arm.write_arm(tmp_path))
     kind = model.bound(LinkMass)
-    prefix, link, centre, *_ = kind.places[0]
+    link, centre, *_ = kind.places[0]
+    prefix = f'{link}.'
     away = np.array([0.3, -0.2, 0.5])
     rng = np.random.default_rng(2)
     q, v, a = rng.uniform(-1, 1, (3, 25, 3))
@@ -49,7 +50,8 @@ def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
     real = arm.real_arm(tmp_path)
     kind = model.bound(LinkMass)
     name = model.robot.body_names[1]
-    prefix, link, centre, *_ = next(one for one in kind.places if one[1] == name)
+    link, centre, *_ = next(place for place in kind.places if place.link == name)
+    prefix = f'{link}.'
     away = np.array([0.1, 0.3, -0.2])
     real = replace(real, robot=real.robot.with_body(
         link, body_at(MASS, tuple(centre + away), np.zeros((3, 3)))))

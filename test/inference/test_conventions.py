@@ -67,10 +67,6 @@ def ordered(*columns: int) -> Callable[[Arrays], Arrays]:
     return lambda a: (a[0], a[1][:, order], a[2][:, order], a[3][:, order])
 
 
-def backwards(a: Arrays) -> Arrays:
-    return a[0], a[1][::-1], -a[2][::-1], a[3][::-1]
-
-
 MINUS, TIMES = 'looks like minus what the model says', 'times what the model says'
 MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
     'kN': (scaled(effort=1e-3), [f'effort of all drives looks like 0.001 {TIMES}, as if .* kN']),
@@ -87,7 +83,6 @@ MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
         scaled(motion=[-1, 1, 1, 1, 1, 1], effort=[-1, 1, 1, 1, 1, 1]),
         ['position of slide_1 looks negated', f'effort of slide_1 {MINUS}']),
     'lifts for slides': (ordered(3, 4, 5, 0, 1, 2), ['another order: .*slide_1 like lift_1']),
-    'backwards': (backwards, ['played backwards: friction drives the motion']),
     'mm and kN': (scaled(motion=1e3, effort=1e-3), ['look like millimetres', 'as if .* kN'])}
 
 

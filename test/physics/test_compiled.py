@@ -25,7 +25,6 @@ from random_states import model_of, paper_model, random_motion, random_robot
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.physics.mechanism import evaluation
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 # Compiled, sums may be associated otherwise; forces of up to 40 N then differ by some 1e-14.
 AGREEMENT = 1e-12
@@ -53,11 +52,11 @@ def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarra
     forces = model.drive_forces(motion)
     s = forces.mechanism
     kept = model.forces_at(model.mechanism(motion))
-    found = solve_forward_motion(model.robot.geometry, s.position, s.velocity, s.acceleration)
+    found = model.robot.motion_of_drives(s.position, s.velocity, s.acceleration)
     return {'total': forces.total, **forces.parts, 'in steps': kept.total,
             'position': s.position, 'acceleration': s.acceleration, 'J': s.links.J,
             'friction_load': s.friction_load,
-            'reactions': np.stack(s.reactions.reactions), 'found': found.rows}
+            'found': found.rows}
 
 
 @pytest.mark.parametrize('variant', VARIANTS)

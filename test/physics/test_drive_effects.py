@@ -278,7 +278,7 @@ def test_a_filtered_ramp_is_the_solution_of_its_differential_equation(time_const
     """(T/2 d/dt + 1)^2 y = t from rest has y = t - T + (t + T) exp(-2 t / T)."""
     t = np.arange(0.0, 1.0, 0.0005)
     effect = EffortFilter({'axis': {'time_constant': time_constant}})
-    y = effect.sensed(t[:, None], t, ('axis',))[:, 0]
+    y = effect.sense(t, DriveSamples(t, *[np.zeros_like(t)] * 6), **effect.drives['axis'])
     expected = t - time_constant + (t + time_constant) * np.exp(-2 * t / time_constant)
     assert_allclose(y, expected, atol=1e-2 * time_constant)
 

@@ -61,13 +61,16 @@ def motion(robot):
     return random_motion(np.random.default_rng(52), STATES, robot.geometry.elbow)
 
 
+def loads_of_joints(robot, forces):
+    """Return what the tree of the robot's joints and closures transmits."""
+    free = np.full(6, np.inf)
+    tree, s = robot.as_mechanism((-free, free), free), forces.mechanism
+    return tree, tree.loads(tree.at(s.position, s.velocity, s.acceleration), None)
+
+
 def reactions_on_platform(robot, forces):
-    """Return the force of every rod on the platform, (N, 3, 3) [N], from H, V and W."""
-    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.links, \
-        forces.mechanism.reactions.reactions
-    c, s = chains.cos_u[..., None], chains.sin_u[..., None]
-    along, normal = -c * e + s * UP, -(s * e + c * UP)
-    return r.H[..., None] * n + r.V[..., None] * along + r.W[..., None] * normal
+    """Return the force of every rod on the platform, (N, 3, 3) [N]."""
+    return loads_of_joints(robot, forces)[1].F
 
 
 def inertia_in_base(robot, motion):
@@ -150,10 +153,6 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     from_slide = at_C + lifts * (a_lift - g)
     from_base = from_slide + slides * (a_slide - g)
 
-    r = body.reactions
-    assert_allclose(r.H_star, np.sum(at_C * n, axis=-1), rtol=0, atol=ROUNDING)
-    assert_allclose(r.V_star, at_C[..., 2], rtol=0, atol=ROUNDING)
-    assert_allclose(r.W_star, -np.sum(at_C * e, axis=-1), rtol=0, atol=ROUNDING)
     # A drive pushes along its guide; the rest of the force is the guide's load.
     assert_allclose(body.efforts[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
     assert_allclose(body.efforts[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
@@ -183,12 +182,13 @@ def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
     velocities.
     """
     _, n = chain_vectors(robot.geometry)
-    r = forces.mechanism.reactions.reactions
+    tree, loads = loads_of_joints(robot, forces)
+    at_C = loads.f[:, [tree.structure.rows[f'hinge_{i}'] for i in (1, 2, 3)]]
     rod = forces.mechanism.links.u_dot[..., None] * n
     relative = rod - motion.angular_velocity[:, None]
     moments = []
     for velocity, load, c, mu, d in (
-            (rod, np.hypot(r.V_star, r.W_star), c_r, mu_r, d_r),
+            (rod, np.linalg.norm(np.cross(at_C, n), axis=-1), c_r, mu_r, d_r),
             (relative, np.linalg.norm(reactions_on_platform(robot, forces), axis=-1),
              c_s, mu_s, d_s)):
         speed = np.linalg.norm(velocity, axis=-1, keepdims=True)

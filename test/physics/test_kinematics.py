@@ -33,7 +33,6 @@ from pprs_dynamics.errors import (
     SingularityError,
     WorkspaceError,
 )
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 POSES = 4000
@@ -56,7 +55,7 @@ def home_pose():
 
 def forward(geometry, q):
     """Return poses of drive positions."""
-    return solve_forward_motion(geometry, q, np.zeros_like(q), np.zeros_like(q))
+    return replace(paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
 
 
 def rotation_vector(motion):
@@ -149,7 +148,7 @@ def test_drives_that_cannot_close_the_mechanism_raise(geometry):
     ids=['five', 'none', 'nan', 'ragged', 'words'])
 def test_drive_positions_that_are_none_raise(q):
     with pytest.raises(MotionError, match='drive positions'):
-        solve_forward_motion(paper_geometry(), q, np.zeros((1, 6)), np.zeros((1, 6)))
+        paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
 
 
 def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():

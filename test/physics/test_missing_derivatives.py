@@ -13,7 +13,9 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
+
+READER = readers_for(DriveModel.load())[TRAJECTORY]
 
 TIMES = np.arange(0.0, 1.0, 0.01)
 SMOOTH = smooth_motion(TIMES)
@@ -29,7 +31,7 @@ def without(motion: PlatformMotion, *fields: str, points: slice | None = None,
 
 
 def motion_of(message: MultiDOFJointTrajectory) -> PlatformMotion:
-    return read_trajectory(message, 1, missing='spline').motion
+    return READER.of_message(message, 1, missing='spline').motion
 
 
 def test_the_spline_gives_the_derivatives_of_a_motion_known_in_closed_form() -> None:
@@ -66,7 +68,7 @@ def test_too_few_points_and_the_policy_reject_refuse_with_the_code_size(
 ) -> None:
     for motion, policy in ((SMOOTH[:3], 'spline'), (SMOOTH[:1], 'spline'), (SMOOTH, 'reject')):
         with pytest.raises(Rejection, match=r'^SIZE: point 0 has 0'):
-            read_trajectory(without(motion, *fields), 1, missing=policy)
+            READER.of_message(without(motion, *fields), 1, missing=policy)
     motion_of(without(SMOOTH[:4], *fields))
 
 

@@ -28,7 +28,7 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import reader_for
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
@@ -56,7 +56,7 @@ def forwarded(
     message = conversions.write_trajectory(
         motion, conversions.time(NOW + round(ahead * 1e9)),
         [round(k * 1e9 / rate) for k in range(points)])
-    request = reader_for(model).read(serialize_message(message), NOW, 'reject')
+    request = readers_for(model)[TRAJECTORY].read(serialize_message(message), NOW, 'reject')
     feedforward = Feedforward(model, OWN)
     drives = feedforward.ending_at_rest(feedforward.answer(request), stop_time)
     return drives.message(request.start, conversions.PAPER)
@@ -279,7 +279,7 @@ def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
     motion = HelicalPath().motion(np.array([1.0]))
     for frame, accepted in (('left_base', True), ('', True), ('base', False)):
         message = conversions.write_trajectory(motion, conversions.time(NOW), [0], frame)
-        read = reader_for(model, names).read
+        read = readers_for(model, names)[TRAJECTORY].read
         if not accepted:
             with pytest.raises(Rejection, match='left_base'):
                 read(serialize_message(message), NOW, 'reject')

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from node_bench import bench, overrides
-from rcl_interfaces.msg import ParameterType, SetParametersResult
-from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
@@ -108,31 +108,26 @@ def test_what_is_not_allowed_is_refused_with_name_value_and_rule(caller: Caller)
     assert caller.node.answer(MESSAGE) == plain
 
 
-def types(caller: Caller, *names: str) -> list[int]:
-    described = caller.call(DescribeParameters, 'describe_parameters', names=names).descriptors
-    return [each.type for each in described]
-
-
-def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) -> None:
-    assert caller.set('effects.effort_offset.lift_1.force', 1).successful
-    names = ('masses.payload', 'gravity', 'effort_limits', 'effects.active', 'command_timeout',
-             'effects.effort_offset.lift_1.force')
-    double, doubles = ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_DOUBLE_ARRAY
-    strings = ParameterType.PARAMETER_STRING_ARRAY
-    wanted = [double, doubles, doubles, strings, double, double]
-    assert types(caller, *names) == wanted
+def test_whole_numbers_and_empty_lists_are_taken_for_decimal_ones(caller: Caller) -> None:
     for name, value in (('masses.payload', 2), ('gravity', [0, 0, -10]), ('command_timeout', 1),
-                        ('effort_limits', [20] * 6), ('effects.effort_offset.lift_1.force', 2)):
+                        ('effort_limits', [2000] * 6), ('effects.active', ['effort_offset']),
+                        ('effects.effort_offset.lift_1.force', 1), ('effort_limits', [])):
         result = caller.set(name, value)
-        assert result.successful, result.reason
-    values = caller.call(GetParameters, 'get_parameters', names=names).values
-    assert [value.type for value in values] == wanted
-    assert values[0].double_value == 2.0
-    assert list(values[1].double_array_value) == [0.0, 0.0, -10.0]
-    # As `ros2 param set` says an empty list, whose elements have no type.
-    empty = caller.set('effort_limits', [])
-    assert empty.successful, empty.reason
-    assert types(caller, *names) == wanted
+        # An effect in force has to have its numbers first.
+        assert result.successful or name == 'effects.active', result.reason
+    assert caller.set('effects.active', ['effort_offset']).successful
+    expected = DriveModel.from_parameters({
+        **DriveModel.load().values, 'masses.payload': 2.0, 'gravity': [0.0, 0.0, -10.0],
+        'effects.active': ['effort_offset'], 'effects.effort_offset.lift_1.force': 1.0})
+    np.testing.assert_allclose(caller.node.answer(MESSAGE), expected.drive_forces(MOTION).total[0],
+                               rtol=0, atol=EQUAL)
+
+
+def test_a_parameter_is_described_with_unit_and_rule(caller: Caller) -> None:
+    described, = caller.call(DescribeParameters, 'describe_parameters',
+                             names=['masses.payload']).descriptors
+    assert '[kg]' in described.description
+    assert described.additional_constraints.startswith('must be a number at least 0')
 
 
 def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
@@ -144,9 +139,8 @@ def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
                '-p', 'qos_overrides./effort/commands.publisher.reliability:=best_effort']
     with bench() as running, node_process(command, ros_domain, log):
         running.listen(Float64MultiArray, '/effort/commands')  # reliable
-        assert running.spin_until(lambda: 'reliability' in log.read_text(), 20), log.read_text()
-    assert '/effort/commands: a listener asks for another reliability' in log.read_text()
-    assert '~/' not in log.read_text()
+        assert running.spin_until(lambda: 'RELIABILITY' in log.read_text(), 20), log.read_text()
+    assert "'/effort/commands', requesting incompatible QoS" in log.read_text()
 
 
 @pytest.mark.parametrize(('node', 'name', 'value'), [

@@ -15,7 +15,6 @@ CATCH_UP = round(LONGEST_CATCH_UP * 1e9)
 def played(ticks: list[int]) -> list[list[int]]:
     """Return the moments, from the start on, that are due at each tick [ns]."""
     beats = Beats(PERIOD)
-    beats.start(START)
     return [[moment - START for moment in beats.due(START + tick)] for tick in ticks]
 
 

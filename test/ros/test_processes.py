@@ -16,10 +16,11 @@ from node_bench import Bench, bench
 from ros_processes import environment, executable
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
 
 pytestmark = pytest.mark.nodes
 
@@ -52,7 +53,8 @@ def test_a_csv_of_poses_is_played_as_the_motion_that_it_is(
     assert done.returncode == 0, done.stderr
     assert running.spin_until(lambda: len(received) == len(motion))
     assert [len(message.points) for message in received] == [2] * (len(motion) - 1) + [1]
-    played = [read_trajectory(message, 1).motion for message in received]
+    reader = readers_for(DriveModel.load())[TRAJECTORY]
+    played = [reader.of_message(message, 1).motion for message in received]
     for name in ('position', 'orientation', 'linear_velocity', 'angular_acceleration'):
         np.testing.assert_allclose([getattr(p, name)[0] for p in played], getattr(motion, name),
                                    rtol=0, atol=EQUAL)

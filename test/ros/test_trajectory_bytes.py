@@ -25,13 +25,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import (
-    RequestReader,
-    joint_reader,
-    read_joint_trajectory,
-    read_trajectory,
-    reader_for,
-)
+from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, RequestReader, readers_for
 
 pytestmark = pytest.mark.nodes
 
@@ -50,7 +44,7 @@ def random_message(points: int, seed: int) -> MultiDOFJointTrajectory:
 
 
 def poses() -> RequestReader:
-    return reader_for(DriveModel.load())
+    return readers_for(DriveModel.load())[TRAJECTORY]
 
 
 def outcome(read: Callable[..., Any], *what: Any) -> object:
@@ -94,8 +88,8 @@ def joint_message(points: int, seed: int, joints: Sequence[str] = LEGS) -> Joint
 def test_joints_come_in_any_order_and_frame(order: tuple[str, ...]) -> None:
     message = joint_message(2, 3, order)
     message.header.frame_id = 'map'
-    assert from_bytes(joint_reader(LEGS), message) == outcome(
-        read_joint_trajectory, message, LEGS)
+    reader = RequestReader(JointTrajectory, LEGS)
+    assert from_bytes(reader, message) == outcome(reader.of_message, message)
 
 
 def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
@@ -130,11 +124,10 @@ def alter_joints(message: JointTrajectory, rng: np.random.Generator) -> None:
         setattr(point, field, [0.5] * int(rng.choice([0, 5, 7] if field != 'effort' else [1, 6])))
 
 
-# How a random message is made, how its layout is changed, and the two ways to read it.
+# How a random message is made, how its layout is changed, and what reads it.
 KINDS = {
-    'poses': (random_message, alter, poses(), read_trajectory),
-    'joints': (joint_message, alter_joints, joint_reader(LEGS),
-               lambda message, *more: read_joint_trajectory(message, LEGS, *more))}
+    'poses': (random_message, alter, poses()),
+    'joints': (joint_message, alter_joints, RequestReader(JointTrajectory, LEGS))}
 every_kind = pytest.mark.parametrize('kind', KINDS)
 
 
@@ -142,9 +135,9 @@ every_kind = pytest.mark.parametrize('kind', KINDS)
 @settings(max_examples=200)
 @given(POINTS, SEEDS)
 def test_bytes_and_objects_give_the_same_numbers(kind: str, points: int, seed: int) -> None:
-    make, _, reader, ordinary = KINDS[kind]
+    make, _, reader = KINDS[kind]
     message = make(points, seed)
-    assert from_bytes(reader, message) == outcome(ordinary, message)
+    assert from_bytes(reader, message) == outcome(reader.of_message, message)
 
 
 @every_kind
@@ -153,10 +146,10 @@ def test_bytes_and_objects_give_the_same_numbers(kind: str, points: int, seed: i
 def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
     kind: str, points: int, seed: int,
 ) -> None:
-    make, change, reader, ordinary = KINDS[kind]
+    make, change, reader = KINDS[kind]
     message = make(points, seed)
     change(message, np.random.default_rng(seed))
-    assert outcome(reader.read, serialize_message(message)) == outcome(ordinary, message)
+    assert outcome(reader.read, serialize_message(message)) == outcome(reader.of_message, message)
 
 
 @every_kind
@@ -165,19 +158,19 @@ def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
 def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(
     kind: str, points: int, seed: int,
 ) -> None:
-    make, _, reader, ordinary = KINDS[kind]
+    make, _, reader = KINDS[kind]
     rng = np.random.default_rng(seed)
     data = bytearray(serialize_message(make(points, seed)))
     for _ in range(int(rng.integers(1, 5))):
         data[int(rng.integers(len(data)))] = int(rng.integers(256))
 
     def by_object(data: bytes, now: int, missing: str) -> Any:
-        return ordinary(message_in(data, reader.message), now, missing)
+        return reader.of_message(message_in(data, reader.message), now, missing)
 
     assert outcome(reader.read, bytes(data)) == outcome(by_object, bytes(data))
 
 
-@pytest.mark.parametrize('reader', [poses(), joint_reader(LEGS)])
+@pytest.mark.parametrize('reader', [poses(), RequestReader(JointTrajectory, LEGS)])
 def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected(reader: RequestReader) -> None:
     data = bytearray(serialize_message(
         random_message(1, 2) if reader.message is MultiDOFJointTrajectory else joint_message(1, 2)))

@@ -25,13 +25,14 @@ from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     POSES,
     TRAJECTORY,
-    read_joint_trajectory,
+    RequestReader,
     readers_for,
 )
 
 JOINTS = ('shoulder', 'elbow', 'wrist')
 TIMES = np.arange(0.25, 0.65, 0.02)  # the first point is due later
 RATES = np.array([2.0, 3.0, 5.0])
+READER = RequestReader(JointTrajectory, JOINTS)
 
 
 def message(order: tuple[int, ...] = (0, 1, 2), *lacking: str) -> JointTrajectory:
@@ -57,7 +58,7 @@ def lasting(time: float) -> Duration:
 def test_joints_may_come_in_any_order() -> None:
     angle = TIMES[:, None] * RATES
     for order in ((0, 1, 2), (2, 0, 1), (1, 0, 2)):
-        found: Any = read_joint_trajectory(message(order), JOINTS, 7)
+        found: Any = READER.of_message(message(order), 7)
         assert found.start == 7
         np.testing.assert_array_equal(found.offsets, np.round(1e9 * TIMES))
         np.testing.assert_allclose(found.motion.position, np.sin(angle), atol=1e-15)
@@ -69,14 +70,14 @@ def test_joints_may_come_in_any_order() -> None:
 def test_a_stamp_is_the_start() -> None:
     stamped = message()
     stamped.header.stamp = Time(sec=12, nanosec=34)
-    assert read_joint_trajectory(stamped, JOINTS, 7).start == 12_000_000_034
+    assert READER.of_message(stamped, 7).start == 12_000_000_034
 
 
 @pytest.mark.parametrize('lacking', [('accelerations',), ('velocities', 'accelerations')])
 def test_derivatives_that_are_missing_are_those_of_a_spline_through_the_positions(
     lacking: tuple[str, ...],
 ) -> None:
-    found: Any = read_joint_trajectory(message((0, 1, 2), *lacking), JOINTS, 7, 'spline')
+    found: Any = READER.of_message(message((0, 1, 2), *lacking), 7, 'spline')
     angle = TIMES[:, None] * RATES
     np.testing.assert_allclose(found.motion.velocity, RATES * np.cos(angle), atol=1e-4)
     np.testing.assert_allclose(found.motion.acceleration, -RATES ** 2 * np.sin(angle), atol=2e-2)
@@ -86,7 +87,7 @@ def test_derivatives_that_are_missing_are_those_of_a_spline_through_the_position
 
 def test_what_is_missing_is_rejected_where_no_spline_is_asked_for() -> None:
     with pytest.raises(Rejection, match='point 0 has 0 accelerations, must have 3'):
-        read_joint_trajectory(message((0, 1, 2), 'accelerations'), JOINTS, 7)
+        READER.of_message(message((0, 1, 2), 'accelerations'), 7)
 
 
 @pytest.mark.parametrize('names', [JOINTS[:2], (*JOINTS, 'gripper'), ('a', 'b', 'c'),
@@ -95,7 +96,7 @@ def test_other_joints_are_rejected(names: tuple[str, ...]) -> None:
     wrong = message()
     wrong.joint_names = list(names)
     with pytest.raises(Rejection, match='must hold each of shoulder, elbow, wrist once'):
-        read_joint_trajectory(wrong, JOINTS, 7)
+        READER.of_message(wrong, 7)
 
 
 def test_a_robot_with_loops_takes_its_drives_and_poses_of_its_tool_in_its_frame() -> None:

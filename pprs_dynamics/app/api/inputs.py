@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.readings.check import with_mistakes
@@ -117,13 +117,16 @@ class Inputs:
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
         given = base or '' if isinstance(model, DriveModel) else model
-        name = '' if shipped else str(given)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
-        _refuse_repeats(held_out, fitted, OTHER)
-        paths = frozenset(entry.name for entry in (*fitted, *held_out) if entry.is_path)
-        return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
+        _refuse_repeats(held_out, fitted.values(), OTHER)
+        entries = [*listed_recordings(recordings), *listed_recordings(validate)]
+        paths = frozenset(str(entry) for entry in entries if not isinstance(entry, Recording))
+        return cls(found, fitted, held_out, paths, base, '' if shipped else str(given), topic or '')
+
+    def _each(self, change: Callable[[Mapping[str, Recording]], dict[str, Recording]]) -> Inputs:
+        return replace(self, recordings=change(self.recordings), validation=change(self.validation))
 
     def checked(self) -> Inputs:
         """Return this with what the numbers of files rather mean among the findings.
@@ -134,17 +137,14 @@ class Inputs:
             Where one looks as if it were in other units, signs or another order than it says, but
             with `as_it_is`.
         """
-        def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-            return {name: with_mistakes(self.model, recording, refuse=not self.as_it_is)
-                    if name in self.paths else recording for name, recording in recordings.items()}
-        return replace(self, recordings=each(self.recordings), validation=each(self.validation))
+        return self._each(lambda given: {
+            name: with_mistakes(self.model, recording, refuse=not self.as_it_is)
+            if name in self.paths else recording for name, recording in given.items()})
 
     def within_memory(self) -> Inputs:
         """Return this with no more of each recording than a fit can hold."""
-        def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-            return dict(zip(recordings, excerpts_within_memory(
-                self.model, list(recordings.values())), strict=True))
-        return replace(self, recordings=each(self.recordings), validation=each(self.validation))
+        return self._each(lambda given: dict(zip(given, excerpts_within_memory(
+            self.model, list(given.values())), strict=True)))
 
     def with_more(self, path: File, is_held_out: bool = False) -> Inputs:
         """Return this with one more file; errors as `of`."""
@@ -155,20 +155,14 @@ class Inputs:
                 raise
             # Of several that it may hold.
             more = Inputs.of(self.model, path, topic=self.topic, as_it_is=self.as_it_is)
-        _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
-                        [_Read(name, entry, True) for name, entry in
-                         {**self.recordings, **self.validation}.items()], ONCE)
+        _refuse_repeats(more.recordings, [*self.fitted, *self.held_out], ONCE)
         if self.reference is not None:
             from pprs_dynamics.inference.fit.reference_runs import OTHER as OTHER_RUN
 
-            _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
-                            [_Read(recording.name, recording, True)
-                             for recording in self.reference.recordings], OTHER_RUN)
-        if is_held_out:
-            return replace(self, validation={**self.validation, **more.recordings},
-                           paths=self.paths | more.paths)
-        return replace(self, recordings={**self.recordings, **more.recordings},
-                       paths=self.paths | more.paths)
+            _refuse_repeats(more.recordings, self.reference.recordings, OTHER_RUN)
+        found = replace(self, paths=self.paths | more.paths)
+        return (replace(found, validation={**self.validation, **more.recordings}) if is_held_out
+                else replace(found, recordings={**self.recordings, **more.recordings}))
 
     def without(self, name: str) -> Inputs:
         """Return this with one recording fewer.
@@ -280,17 +274,16 @@ def _read(model: DriveModel, path: File, topic: str | None, progress: Progress |
                           lambda done, total: report(done / total if total else 0.0))
 
 
-class _Read(NamedTuple):
-    name: str
-    recording: Recording
-    is_path: bool
-
-
 def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Progress | None,
-              ) -> list[_Read]:
-    return [_Read(entry.name, entry, False) if isinstance(entry, Recording)
-            else _Read(str(entry), _read(model, entry, topic, progress), True)
-            for entry in listed_recordings(given)]
+              ) -> dict[str, Recording]:
+    """Return recordings by path or name; of those from memory two may have the same."""
+    found: dict[str, Recording] = {}
+    for entry in listed_recordings(given):
+        recording = entry if isinstance(entry, Recording) else _read(model, entry, topic, progress)
+        name = entry.name if isinstance(entry, Recording) else str(entry)
+        same = sum(key == name or key.startswith(f'{name} (') for key in found)
+        found[f'{name} ({same + 1})' if same else name] = recording
+    return found
 
 
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
@@ -301,26 +294,16 @@ def listed_recordings(given: Given) -> Sequence[File | Recording]:
 def _require_kinds(recordings: Given, validate: Given) -> None:
     """Raise InputError for recordings that are neither a path nor a Recording."""
     for name, given in (('recordings', recordings), ('validate', validate)):
-        listed = (listed_recordings(given) if isinstance(
-            given, (str, PathLike, Recording, Sequence)) else [given])
+        listed = listed_recordings(given) if isinstance(given, (PathLike, Sequence)) else [given]
         for entry in listed:
             if not isinstance(entry, (Recording, str, PathLike)):
-                kind = type(entry).__name__
-                raise InputError(f'{name}: one is of type {kind}, must be a path or a Recording '
-                                 '(Recording.from_arrays makes one of arrays)')
+                raise InputError(f'{name}: one is of type {type(entry).__name__}, must be a path '
+                                 'or a Recording (Recording.from_arrays makes one of arrays)')
 
 
-def _named(found: Sequence[_Read]) -> dict[str, Recording]:
-    """Return recordings by name; of those from memory two may have the same."""
-    named: dict[str, Recording] = {}
-    for entry in found:
-        same = sum(other.name == entry.name for other in found[:len(named)])
-        named[f'{entry.name} ({same + 1})' if same else entry.name] = entry.recording
-    return named
-
-
-def _refuse_repeats(found: Sequence[_Read], earlier: Sequence[_Read], rule: str) -> None:
-    repeat = find_repeat([entry.recording for entry in found], [each.recording for each in earlier])
+def _refuse_repeats(found: Mapping[str, Recording], earlier: Iterable[Recording], rule: str,
+                    ) -> None:
+    repeat = find_repeat([*found.values()], [*earlier])
     if repeat is not None:
         index, clause = repeat
-        raise UnreadableFileError(found[index].name, f'{clause}, but {rule}')
+        raise UnreadableFileError([*found][index], f'{clause}, but {rule}')

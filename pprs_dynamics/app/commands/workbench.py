@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from typing import Any
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import (
@@ -20,7 +21,7 @@ from pprs_dynamics.app.commands.arguments import (
     whole,
 )
 from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
+from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.app.workbench.session_file import ENDING, SavedSession
@@ -100,7 +101,7 @@ def _ros_name(text: str) -> str:
     return text
 
 
-def _live(options: argparse.Namespace, model: DriveModel) -> LiveSource:
+def _live(options: argparse.Namespace, model: DriveModel) -> Any:
     try:
         from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:

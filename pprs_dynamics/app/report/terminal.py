@@ -36,9 +36,7 @@ def console(**options: Any) -> Any:
             return super().render_str(plain, *args, **options)
 
         def print(self, *objects: Any, **options: Any) -> None:
-            # Names of files in a line stay whole, so that they can be copied; frames are wrapped.
-            lines = {'overflow': 'ignore'} if all(isinstance(o, str) for o in objects) else {}
-            super().print(*objects, **{'crop': False, **lines, **options})
+            super().print(*objects, **{'crop': False, **options})  # as of `shell_command`
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)

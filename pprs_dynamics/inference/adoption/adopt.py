@@ -260,7 +260,7 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
-            answer.fits, answer.fitted, answer.widths) if number.after != number.before))
+            answer.fits, answer.fitted) if number.after != number.before))
 
 
 def _of_table(case: _Case, request: EffectRequest, row: Row, effect: FoundEffect,

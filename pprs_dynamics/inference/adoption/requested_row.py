@@ -18,7 +18,6 @@ from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Estimate, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
-from pprs_dynamics.inference.search.reversal_widths import with_widths
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -101,9 +100,8 @@ def requested_model(answer: Answer, request: EffectRequest, effect: FoundEffect,
         For values that no model may have.
     """
     base, placed = parts_of(answer.fits, answer.fitted)
-    model = with_widths(model_at(answer.design, base, [
-        each for each in placed if each.effect.name == request.name]),
-        answer.design, answer.widths)
+    model = model_at(answer.design, base, [
+        each for each in placed if each.effect.name == request.name])
     known = {each.name: estimate_present(answer.fits, answer.fitted, each)
              for each in model.effects if each.name != request.name
              and isinstance(each, (DriveEffect, StructureEffect))

@@ -23,7 +23,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.quantities import listed, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
-from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import rms
@@ -60,7 +59,6 @@ from pprs_dynamics.inference.search.held_out import (
     predictive_gain,
 )
 from pprs_dynamics.inference.search.noise_floors import noise_at_most, noise_floors
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -99,12 +97,10 @@ class Answer:
     def __init__(self, table: ModelTable, row: Row, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
         self.table, self.row, self.validate, self.decisions = table, row, validate, decisions
-        self.fits, self.fitted, self.widths = row.fits, row.fitted, dict[int, float]()
+        self.fits, self.fitted = row.fits, row.fitted
         self.design, self.given = row.fits.design, table.first.design.residuals
         self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
         self.remaining = self._remaining()
-        if not row.fitted.is_dated:
-            self._fit_widths()
         # What a row leaves without an effect that was found no finding is no noise.
         fits, fitted = (self.fits, self.fitted) if row is table.best else (
             table.best.fits, table.best.fitted)
@@ -129,24 +125,6 @@ class Answer:
             remaining[:, d] -= series.open_forces(remaining[:, d])
         return remaining
 
-    @outside_cost('widths of reversal are refitted if the error falls with them')
-    def _fit_widths(self) -> None:
-        """Fit the velocities within which friction reverses, where the error falls with them."""
-        widths = estimate_widths(self.fits, self.fitted)
-        if not widths:
-            return
-        before = vars(self).copy()
-        base, effects = parts_of(self.fits, self.fitted)
-        model = with_widths(self.adopted, self.design, widths)
-        self.fits = FittedSets(self.design.around(OperatingPoint(model, base, effects), alone=True),
-                               self.fits.decisions, self.fits.regression.error_scale)
-        self.fitted = self.fits.refined(self.fits.evaluate(self.fitted.candidates))
-        self.design, self.widths = self.fits.design, widths
-        self.adopted = with_widths(model_of(self.fits, self.fitted), self.design, widths)
-        self.remaining = self._remaining()
-        if root_mean_square(self.remaining) > root_mean_square(before['remaining']):
-            vars(self).update(before)
-
     def force(self, candidate: EffectCandidate | UnknownCandidate) -> Array:
         """Return what a candidate of the row contributes, (M, D) [N]."""
         return self.fits.components.force(self.fitted, candidate, self.remaining.shape)
@@ -169,7 +147,7 @@ class Answer:
                      for effect in effects)
         verdict = ('unknown' if unconfirmed or depends or above or little or drifts
                    else 'ambiguous' if rivals else 'effect' if effects else 'adequate')
-        moved = [number for number in calibrations(self.fits, self.fitted, self.widths)
+        moved = [number for number in calibrations(self.fits, self.fitted)
                  if abs(number.after - number.before) > self.decisions.sure * number.std]
         refit = root_mean_square(self.remaining + sum(
             (effect.force for effect in effects), np.zeros_like(self.remaining)))

@@ -100,6 +100,31 @@ class DriveComparison:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """Errors of another model on the same recordings.
+
+    Parameters
+    ----------
+    name : str
+        Of its file.
+    drives : mapping of str to float
+        Root of the mean squared error of each drive [N or N m].
+    rms : float
+        The same over all drives.
+    """
+
+    name: str
+    drives: Mapping[str, float]
+    rms: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name and errors."""
+        return {'name': self.name, 'drives': {name: {'rms': finite(value)}
+                                              for name, value in self.drives.items()},
+                'overall': {'rms': finite(self.rms)}}
+
+
+@dataclass(frozen=True)
 class Comparison:
     """All drives, and what they pool to.
 

@@ -195,7 +195,7 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording],
     fits, found = linearised(fits, fits.evaluate(()))
     return fitted_model(fits, found), tuple(
         FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
-        for one in calibrations(fits, found, {})), ()
+        for one in calibrations(fits, found)), ()
 
 
 def _numbers(model: DriveModel, fit: ArmFit) -> tuple[FittedNumber, ...]:

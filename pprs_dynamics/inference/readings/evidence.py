@@ -73,9 +73,8 @@ def parts_of(model: DriveModel, excerpt: Excerpt, reading: Reading, in_pieces: b
 
 def read_motion(motion: DriveMotion, reading: Reading) -> DriveMotion:
     """Return a recorded motion in a reading."""
-    turn = -1.0 if reading.backwards else 1.0
     return replace(motion, position=motion.position @ reading.position.T + reading.offset,
-                   velocity=turn * motion.velocity @ reading.position.T,
+                   velocity=motion.velocity @ reading.position.T,
                    acceleration=motion.acceleration @ reading.position.T)
 
 

@@ -57,7 +57,7 @@ REVERSAL = 0.2
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
         'drive_constant': 10.0}
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
@@ -187,8 +187,6 @@ class Reading:
         Prior cost [nats].
     offset : (D,) array, optional
         Added to positions.
-    backwards : bool
-        Whether time runs the other way.
     """
 
     kind: str
@@ -198,7 +196,6 @@ class Reading:
     effort: Array
     cost: float
     offset: Array | float = 0.0
-    backwards: bool = False
 
     def effort_of(self, effort: Array) -> Array:
         """Return recorded efforts, (N, D), in this reading; NaN where not measured."""
@@ -247,8 +244,6 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: b
         yield Reading('position_sign', f'the {_position(drives, group)} negated', group,
                       np.diag(_scaled(count, group, -1.0)), same, COST['position_sign'] + (
                           ALL_NEGATED if len(group) == count > 1 else 0.0))
-    yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
-                  'drives the motion', every, same, same, COST['reversed_time'], backwards=True)
     for order in _orders(count):
         moved = tuple(k for k in every if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)

@@ -63,7 +63,6 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
     DriveSamples,
-    GainEffect,
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -426,10 +425,8 @@ class Design:
             def seen(recording: FullRate, part: slice) -> Array:
                 effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
                                      effect)[0]
-                if issubclass(effect, GainEffect):
-                    samples = recording.samples(part, drive)
-                    return np.stack([effort * one for one in effect.shares(samples, **shape)])
-                return np.stack(effect.sensor_columns(effort, recording.time[part], **shape))
+                samples = recording.samples(part, drive)
+                return np.stack(effect.sensor_columns(effort, samples, **shape))
 
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
@@ -466,12 +463,8 @@ class Design:
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
                     and (without is None or effect.name != without.name)):
-                if isinstance(effect, GainEffect):
-                    rows = rows * effect.factor(recording.samples(part, drive), name)
-                    continue
-                alone = type(effect)({name: effect.drives[name]})
-                time = recording.time[part]
-                rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
+                samples = recording.samples(part, drive)
+                rows = np.reshape([effect.sense(row, samples, **effect.drives[name])
                                    for row in rows], rows.shape)
         return rows
 

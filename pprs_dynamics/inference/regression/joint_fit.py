@@ -41,6 +41,7 @@ Integers = np.typing.NDArray[np.int_]
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
+LEAST_POSES = 20  # that are held: their errors are independent
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
@@ -120,12 +121,13 @@ class Regression:
         self.noise_shapes = NoiseShapes.of(self.bands)
         every = {d: DriveSeries(residuals, d, self.bands, open_forces.get(d))
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
-        self.series = {d: one for d, one in every.items() if len(one) >= LEAST_SAMPLES}
+        least = LEAST_SAMPLES if np.any(residuals.variables.get('velocity', 1)) else LEAST_POSES
+        self.series = {d: one for d, one in every.items() if len(one) >= least}
         self.drives = tuple(self.series)
         if not self.drives:
             most = max(map(len, every.values()), default=0)
             raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
-                                 f'hold at least {LEAST_SAMPLES} of a drive')
+                                 f'hold at least {least} of a drive')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}

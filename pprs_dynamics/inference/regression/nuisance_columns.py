@@ -68,10 +68,11 @@ def deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
         def read(recording: FullRate) -> Array:
             parts = [np.stack(effect.sensor_deviations(design.sensed(
                 recording.effort[None, part, d], recording, part, d, effect)[0],
-                recording.time[part], **term.shape)) for part in recording.segments]
+                recording.samples(part, d), **term.shape)) for part in recording.segments]
             return np.concatenate(parts, axis=1)
 
-        has_any = effect.sensor_deviations(np.zeros(2), np.arange(2.0), **term.shape)
+        two = design.recordings[0].samples(slice(2), d)
+        has_any = effect.sensor_deviations(two.velocity, two, **term.shape)
         return design.treated(read) if has_any else np.zeros((0, len(design.residuals)))
 
     def rows(recording: FullRate) -> Array:
@@ -97,7 +98,7 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
         state = forces.mechanism
         columns = np.stack([passive_reversal_columns(unit, state) for unit in units])
         for sensor in sensors:
-            columns = np.stack([[sensor.seen(column, state) for column in one]
+            columns = np.stack([[sensor.measured(column, state) for column in one]
                                 for one in columns])
         return {'rows': columns.transpose(2, 0, 1, 3)}
 

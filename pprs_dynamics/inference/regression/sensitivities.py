@@ -230,7 +230,7 @@ class Sensitivities:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
         for effect in self.model.effects:
             if isinstance(effect, MeasurementEffect):
-                column = effect.seen(column, state)
+                column = effect.measured(column, state)
         return column
 
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:

@@ -481,11 +481,6 @@ class PriorCosts:
         times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
         return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.onset_odds)
 
-    def of_width(self, tried: int) -> float:
-        """Return the prior cost of a width of reversal other than the model's, on a drive."""
-        return (2 * log(self.drives) - 2 * log(self.decisions.effect_odds)
-                + max(log(self.samples), 2 * log(tried)))
-
     def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
         """Return the prior cost of an unknown pattern among those tried on each drive."""
         return CostTerms(names=self.of_name() - 2 * log(self.decisions.unknown_odds),

@@ -297,8 +297,8 @@ def body_planes(robot: Mechanism, component: Component, sign: float) -> BodyPlan
     assert issubclass(kind, AddedBody)
     names = [name.rpartition('.') for name in component.names]
     prefix, count = ''.join(names[0][:2]), len(names)
-    link, centre = next((link, np.array(centre)) for before, link, centre, *_ in kind.places
-                        if before == prefix)
+    link, centre = next((place.link, np.array(place.centre)) for place in kind.places
+                        if kind.prefix_of(place) == prefix)
     reach, usual = reach_of(robot), float(np.abs(robot.inertial[:, 0]).mean())
     steps = np.repeat([1.0, reach, reach ** 2], [1, 3, 6])
     row, frame = robot.structure.links[link]

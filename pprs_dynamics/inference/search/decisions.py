@@ -50,9 +50,6 @@ class Decisions:
     # The same for the input model's own friction, beside a further candidate. Load-dependent
     # friction is computed from frictionless loads, 1 to 2 % off.
     own_form_share: float = 0.02
-    # Share of an idealised effect that its lack of fit may put into an exact one. Masses, gravity
-    # and sensors are exact: little else looks like them.
-    exact_share: float = 0.02
     # Error that a drive may keep over its noise, beside what forms of effects leave. What stands
     # out of the noise to the eye must be reported.
     left_ratio: float = 1.5

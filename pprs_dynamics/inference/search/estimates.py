@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,7 +26,6 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.physics.effects.added_body import AXES, AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -415,28 +414,14 @@ def estimate_present(fits: FittedSets, fitted: CandidateSet, effect: CatalogueEf
     return parameters
 
 
-def calibrations(fits: FittedSets, fitted: CandidateSet, widths: Mapping[int, float],
-                 ) -> list[Calibration]:
-    """Return the numbers as the fit moves them within their tolerances, and reversal widths.
-
-    Parameters
-    ----------
-    fits : FittedSets
-    fitted : CandidateSet
-    widths : mapping of drive to float
-        Widths of reversal that differ from the given model's for certain [m/s].
-    """
-    design = fits.design
+def calibrations(fits: FittedSets, fitted: CandidateSet) -> list[Calibration]:
+    """Return the numbers of the model as the fit moves them within their tolerances."""
     calibrated = []
-    for k, column in enumerate(design.base):
+    for k, column in enumerate(fits.design.base):
         if isinstance(column, ModelNumber):
             number = column.number
             std = float(np.sqrt(fitted.fit.covariance[k, k])) * number.deviation
             calibrated.append(Calibration(
                 number.key, number.element, number.value,
                 column.value(float(fitted.fit.coefficients[k])), std, number.unit))
-    before = design.given.reversal.widths(len(design.drives))
-    # Widths are told without an uncertainty: the fits allow for all of them anyway.
-    return calibrated + [
-        Calibration(*place_of(design, d), float(before[d]), width, 0.0, _units(design, d)('m/s'))
-        for d, width in widths.items() if width != before[d]]
+    return calibrated

@@ -4,7 +4,8 @@
 """The form error of idealised effects, and whether a candidate is no more than that.
 
 Real friction, springs and cords differ from the catalogue's forms by up to `Decisions.form_share`
-of their force. Masses, gravity and sensors are exact. A candidate is inadmissible if its force
+of their force. Masses, gravity and sensors are exact: admissible, and no form error of others. An
+idealised candidate is inadmissible if its force
 beyond all other candidates is smaller than the form error of these: the data cannot separate the
 two. With other candidates the input model's friction counts with `Decisions.own_form_share`.
 """
@@ -97,17 +98,17 @@ class FormErrors:
         forces : list, optional
             Of `forces`, where it is known.
         """
-        is_exact = isinstance(candidate, EffectCandidate) and not (
-            candidate.effect.idealised or candidate.effect.shows_at_reversals)
-        share = (self.decisions.exact_share if is_exact
-                 else self.decisions.form_share / SHAPES ** 0.5)
+        if isinstance(candidate, EffectCandidate) and not (
+                candidate.effect.idealised or candidate.effect.shows_at_reversals):
+            return 0.0, ()  # little looks like masses, gravity and sensors
+        share = self.decisions.form_share / SHAPES ** 0.5
         squares = {
             other.name: share ** 2 * sum(size for d, size in of_drives.items() if d in drives)
             for other, of_drives in (self.forces(fitted) if forces is None else forces)
             if other is not candidate}
         for name, by_band in self._given.items():
             is_own = name in self._own
-            if not is_own or (with_own and not is_exact):
+            if not is_own or with_own:
                 squares[name] = (self._shares[name] if is_own else share) ** 2 * sum(
                     float(by_band[d] @ self.regression.weights(fitted.fit, d)) for d in drives)
         return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)

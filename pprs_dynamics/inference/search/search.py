@@ -237,7 +237,7 @@ class Search:
 
 def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     """Return the patterns of no catalogue of all drives."""
-    shared = Shared()
+    shared: Shared = {}
     return [DrivePatterns(fits.regression, fits.prior_costs, d, shared=shared)
             for d in fits.regression.drives]
 

@@ -8,12 +8,10 @@ They compete with the effects of the catalogue in the same search and by the sam
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -40,22 +38,15 @@ FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
 LIMIT_STEPS = (1.0, 0.2, 0.04, 0.008)
 
 
-class Shared:
-    """What is the same for several drives, made once: families of platform and other drives."""
+Shared = dict[Hashable, Any]
+"""Families of the platform and of other drives by name, made once for all drives."""
 
-    def __init__(self) -> None:
-        self._made: dict[Any, Any] = {}
-        self._locks: defaultdict[Any, Lock] = defaultdict(Lock)
-        self._lock = Lock()  # of the locks: drives do not wait for what only others need
 
-    def once(self, key: Any, make: Callable[[], Any]) -> Any:
-        """Return what `make` makes, of the first call with this key."""
-        with self._lock:
-            lock = self._locks[key]
-        with lock:
-            if key not in self._made:
-                self._made[key] = make()
-            return self._made[key]
+def _once(shared: Shared, key: Hashable, make: Callable[[], Any]) -> Any:
+    """Return what `make` returned at the first call with a key."""
+    if key not in shared:
+        shared[key] = make()
+    return shared[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,48 +66,38 @@ class _Transformed:
     rows: Array
     gram: Array
 
-
-@dataclass(frozen=True, eq=False)
-class _Scanned:
-    """A family for the scans of one drive.
-
-    Parameters
-    ----------
-    family : Family
-    columns : Columns
-        C rows.
-    gram : (B, C, C) array
-        Band sums.
-    precision : (P, k, k) array
-        Of the patterns' g-priors.
-    """
-
-    family: Family
-    columns: Columns
-    gram: Array
-    precision: Array
-
-    @staticmethod
-    def of_patterns(family: Family, S: Array) -> Array:
-        """Return products (C, C) of a family's columns for its patterns, (P, k, k)."""
-        if family.paired:
+    def of_patterns(self, S: Array) -> Array:
+        """Return products (C, C) of the columns for the patterns, (P, k, k)."""
+        if self.family.paired:
             pairs = np.arange(len(S)).reshape(-1, 2)
             found: Array = S[pairs[:, :, None], pairs[:, None, :]]
             return found
-        squares = np.sum(family.weights @ S * family.weights, axis=1)
-        positive: Array = np.maximum(squares, 0.0)[:, None, None]
+        weights = self.family.weights
+        positive: Array = np.maximum(np.sum(weights @ S * weights, axis=1), 0.0)[:, None, None]
         return positive
 
-    def gains(self, fit: JointFit, weights: Array) -> Array:
-        """Return by how much the deviance of a fit falls with each pattern, (P,)."""
-        taken, side = self.columns.projected(fit)
+    def gains(self, columns: Columns, fit: JointFit, weights: Array, scale: float) -> Array:
+        """Return by how much the deviance of a fit falls with each pattern, (P,).
+
+        Parameters
+        ----------
+        columns : Columns
+            The rows, against what is in a fit.
+        fit : JointFit
+        weights : (B,) array
+            Of its noise.
+        scale : float
+            Of the g-priors of the patterns.
+        """
+        taken, side = columns.projected(fit)
         S = np.tensordot(weights, self.gram, 1) - taken @ fit.covariance @ taken.T
         b = side.reshape(-1, 2) if self.family.paired else (self.family.weights @ side)[:, None]
+        precision = self.of_patterns(self.gram.sum(axis=0)) / scale
         # A pattern that no sample shows has no scale, and gains nothing.
-        shown = np.einsum('pkk->p', self.precision) > 0
+        shown = np.einsum('pkk->p', precision) > 0
         found = np.full(len(b), -np.inf)
-        found[shown] = term_gains(self.of_patterns(self.family, S)[shown], b[shown],
-                                  self.precision[shown], np.zeros_like(b[shown]))
+        found[shown] = term_gains(self.of_patterns(S)[shown], b[shown], precision[shown],
+                                  np.zeros_like(b[shown]))
         return found
 
 
@@ -137,7 +118,7 @@ class DrivePatterns:
     def __init__(self, regression: Regression, prior_costs: PriorCosts, d: int,
                  with_plain_forms: bool = False, shared: Shared | None = None) -> None:
         self.regression, self.prior_costs, self.d = regression, prior_costs, d
-        self._shared = shared or Shared()
+        self._shared: Shared = {} if shared is None else shared
         self.series = regression.series[d]
         self.with_plain_forms = with_plain_forms
         residuals = regression.residuals
@@ -155,7 +136,7 @@ class DrivePatterns:
             return DrivePatterns(regression, self.prior_costs, self.d, self.with_plain_forms)
         found = copy(self)
         found.regression, found.series = regression, series
-        vars(found).pop('_scanned', None)
+        vars(found).pop('_columns', None)
         return found
 
     @lazy
@@ -166,27 +147,24 @@ class DrivePatterns:
             rows = self.series.transform(family.columns.astype(np.float32, copy=False))
             return _Transformed(family, rows, self.series.products(rows, rows))
 
-        families = build_families(self.residuals, self.d, lambda name, make: self._shared.once(
-            (samples, name), make))
-        return [self._shared.once(family, partial(transformed, family)) for family in families
+        families = build_families(self.residuals, self.d, lambda name, make: _once(
+            self._shared, (samples, name), make))
+        return [_once(self._shared, family, partial(transformed, family)) for family in families
                 if self.with_plain_forms or not (family.paired or family.is_plain)]
 
     @lazy
-    def _scanned(self) -> list[_Scanned]:
-        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        return [_Scanned(scanned.family, Columns(self.regression, {self.d: scanned.rows}),
-                         scanned.gram,
-                         _Scanned.of_patterns(scanned.family, scanned.gram.sum(axis=0)) / scale)
-                for scanned in self._transformed]
+    def _columns(self) -> list[Columns]:
+        return [Columns(self.regression, {self.d: transformed.rows})
+                for transformed in self._transformed]
 
     def release(self) -> None:
         """Let go of products that only further scans would need."""
-        vars(self).pop('_scanned', None)
+        vars(self).pop('_columns', None)
 
     @property
     def families(self) -> list[Family]:
         """All families that are searched."""
-        return [scanned.family for scanned in self._scanned]
+        return [transformed.family for transformed in self._transformed]
 
     def family_block(self, family: Family) -> Block:
         """Return all columns of a family as one block: any curve along its variable."""
@@ -195,7 +173,7 @@ class DrivePatterns:
 
     def prior_cost(self, family: Family, drives: int = 1) -> CostTerms:
         """Return the prior cost of a pattern of a family: that it is unknown, where, and which."""
-        return self.prior_costs.of_pattern(max(len(self._scanned), 1) * family.alike,
+        return self.prior_costs.of_pattern(max(len(self._transformed), 1) * family.alike,
                                            max(len(family.patterns), 1), drives)
 
     def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
@@ -242,20 +220,18 @@ class DrivePatterns:
             Beyond `count`, those for which there is a plain word: a constant, friction.
         """
         weights = self.regression.weights(fit, self.d)
-        scored: list[tuple[float, _Scanned, int]] = []
-        for scanned in self._scanned:
-            gains = scanned.gains(fit, weights)
+        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
+        scored: list[tuple[float, Family, int]] = []
+        for transformed, columns in zip(self._transformed, self._columns, strict=True):
+            gains = transformed.gains(columns, fit, weights, scale)
             best = int(np.argmax(gains))
-            net = float(gains[best]) - self.prior_cost(scanned.family).total
-            scored.append((net, scanned, best))
+            net = float(gains[best]) - self.prior_cost(transformed.family).total
+            scored.append((net, transformed.family, best))
         scored.sort(key=lambda scored: -scored[0])
-        found = []
-        for rank, (score, scanned, best) in enumerate(scored):
-            family = scanned.family
-            if rank >= count and not (always and family.is_plain):
-                continue
-            found.append((self.candidate(family, family.patterns[best],
-                                         family.pattern_columns(best)), score))
+        found = [(self.candidate(family, family.patterns[best], family.pattern_columns(best)),
+                  score)
+                 for rank, (score, family, best) in enumerate(scored)
+                 if rank < count or (always and family.is_plain)]
         line = self.line(fit)
         if line is not None:
             found.append((line, self.regression.gain(fit, line.blocks[0]) - line.prior_cost))

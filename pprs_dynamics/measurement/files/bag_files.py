@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,11 +20,6 @@ from pprs_dynamics.measurement.files.bag_storage import (
     opened_bag,
     require_rosbags,
 )
-from pprs_dynamics.measurement.files.channel_topics import (
-    channel_of,
-    read_channels,
-    write_channels,
-)
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
     JointStateBlocks,
@@ -34,7 +29,9 @@ from pprs_dynamics.measurement.files.joint_state_cdr import (
 from pprs_dynamics.measurement.files.merged_states import (
     CONTROLLER,
     DYNAMIC,
+    channel_of,
     fields_of,
+    read_channels,
     read_merged,
 )
 from pprs_dynamics.measurement.files.samples import (
@@ -183,15 +180,25 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
             stamps = _stamps(samples)
             # A bag is read in the order of recording: it must not follow a clock that is set back.
             recorded = np.maximum.accumulate(stamps)
-            connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
-            for start in range(0, len(stamps), BLOCK):
-                part = slice(start, start + BLOCK)
-                velocity = None if samples.velocity is None else samples.velocity[part]
-                rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
-                                  samples.effort[part])
-                for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
-                    writer.write(connection, stamp, row.tobytes())
-            write_channels(writer, samples, recorded)
+            _write_states(writer, typestore, topic, samples, stamps, recorded)
+            for channel, values in samples.channels.items():
+                rows = np.isfinite(values).any(axis=1)
+                _write_states(writer, typestore, f'/{channel}', Samples(
+                    samples.drives, samples.time[rows], values[rows], None,
+                    np.full_like(values[rows], np.nan)), stamps[rows], recorded[rows])
+
+
+def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, stamps: Indices,
+                  recorded: Indices) -> None:
+    """Write samples as joint states, with stamps in their headers and as they are recorded."""
+    connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
+    for start in range(0, len(stamps), BLOCK):
+        part = slice(start, start + BLOCK)
+        velocity = None if samples.velocity is None else samples.velocity[part]
+        rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
+                          samples.effort[part])
+        for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
+            writer.write(connection, stamp, row.tobytes())
 
 
 def _chosen(bag: Bag, topic: str | None) -> list[Connection]:

@@ -274,7 +274,7 @@ class Judgement:
 
     def _judge_constant_values(self) -> None:
         samples = self.samples
-        runs = signals.frozen_runs(samples, self._starts)
+        runs = signals.frozen_runs(samples)
         count = sum(last - first for first, last in runs)
         self._tell('frozen_samples', count,
                    f'{counted(count, "sample")} repeating every value of the one before', runs)
@@ -296,7 +296,7 @@ class Judgement:
                            f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} '
                            f'{samples.unit_of(drive, "N")} throughout', drives=[name])
                 continue
-            runs = signals.stuck_efforts(samples, self._starts, drive)
+            runs = signals.stuck_efforts(samples, drive)
             self._tell('constant_effort', len(runs),
                        f'the effort of {name} does not change while it moves', runs, [name])
 

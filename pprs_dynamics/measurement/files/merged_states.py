@@ -6,6 +6,10 @@
 sensor_msgs/JointState of some drives each, or with efforts on a topic of their own;
 control_msgs/DynamicJointState; control_msgs/JointTrajectoryControllerState; messages of any type by
 the fields that a model file names. Definitions of all but the first are those that the bag carries.
+
+Temperatures and pressures are in messages of sensor_msgs, in numbers and joint states on topics
+with such a name, and in interfaces of dynamic joint states. They belong to the drive that their
+topic or frame names, or to all drives.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import Bag, damaged
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
@@ -40,7 +44,12 @@ DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
 # Interfaces of ros2_control.
 INTERFACES = {'position': 'position', 'velocity': 'velocity', 'effort': 'effort',
-              'torque': 'effort', 'force': 'effort', 'current': CURRENT}
+              'torque': 'effort', 'force': 'effort', 'current': CURRENT,
+              **{name: name for name in CHANNELS}}
+# Messages of one sensor, and their field.
+SENSORS = {'sensor_msgs/msg/Temperature': ('temperature', 'temperature'),
+           'sensor_msgs/msg/FluidPressure': ('pressure', 'fluid_pressure')}
+NUMBERS = ('std_msgs/msg/Float32', 'std_msgs/msg/Float64')
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 
@@ -135,7 +144,7 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
                   for field in fields if field.topic == connection.topic]
         try:
             states += [state for state in states_of(message, connection.msgtype)
-                       if state[:2] not in named]
+                       if state[:2] not in named and state[1] not in CHANNELS]
         except (AttributeError, TypeError, ValueError) as error:
             raise UnreadableFileError(bag.path, damaged(error)) from None
         for joint, quantity, value, is_command in states:
@@ -188,14 +197,33 @@ def stamp_of(message: Any) -> int:
     return 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
 
 
-def states_of(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
-    """Yield joint, quantity, value, and whether that is a command, of one message."""
-    if kind == JOINT_STATE:
-        for quantity in QUANTITIES:
-            array = getattr(message, quantity)
-            if len(array) == len(message.name):
-                for joint, value in zip(message.name, array, strict=True):
-                    yield joint, quantity, value, False
+def channel_of(topic: str, kind: str) -> str | None:
+    """Return the channel that messages of a topic are of, by their type or the topic's name."""
+    if kind in SENSORS:
+        return SENSORS[kind][0]
+    return next((name for name in CHANNELS if name in topic.lower()), None) if (
+        kind in (*NUMBERS, JOINT_STATE)) else None
+
+
+def states_of(message: Any, kind: str, topic: str = '', joints: Sequence[str] = (),
+              ) -> Iterator[tuple[str, str, float, bool]]:
+    """Yield joint, quantity, value, and whether that is a command, of one message.
+
+    Of a sensor for all drives the joint is empty; else its topic or frame names one of `joints`.
+    """
+    channel = channel_of(topic, kind)
+    if kind in (*SENSORS, *NUMBERS) and channel:
+        frame = message.header.frame_id if kind in SENSORS else ''
+        parts = {part.removesuffix(f'_{channel}') for part in (*topic.split('/'), frame)}
+        value = float(getattr(message, SENSORS[kind][1] if kind in SENSORS else 'data'))
+        yield next((joint for joint in joints if joint in parts), ''), channel, value, False
+    elif kind == JOINT_STATE:
+        names, arrays = message.name, [getattr(message, quantity) for quantity in QUANTITIES]
+        given = [(channel or quantity, array) for quantity, array in zip(
+            QUANTITIES, arrays, strict=True) if len(array) == len(names)]
+        for quantity, array in given[:1] if channel else given:
+            for joint, value in zip(names, array, strict=True):
+                yield joint, quantity, value, False
     elif kind == DYNAMIC:
         for joint, state in zip(message.joint_names, message.interface_values, strict=False):
             for interface, value in zip(state.interface_names, state.values, strict=False):
@@ -203,13 +231,53 @@ def states_of(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]
                     yield joint, INTERFACES[interface], value, False
     elif kind == CONTROLLER:
         measured, output = message.feedback, message.output
-        efforts = measured.effort if len(measured.effort) else output.effort
+        is_command = not len(measured.effort)
         for quantity, array in (('position', measured.positions),
-                                ('velocity', measured.velocities), ('effort', efforts)):
+                                ('velocity', measured.velocities),
+                                ('effort', output.effort if is_command else measured.effort)):
             if len(array) == len(message.joint_names):
                 for joint, value in zip(message.joint_names, array, strict=True):
-                    yield joint, quantity, value, (
-                        quantity == 'effort' and not len(measured.effort))
+                    yield joint, quantity, value, quantity == 'effort' and is_command
+
+
+def read_channels(bag: Bag, joints: tuple[str, ...], stamps: Indices) -> dict[str, Array]:
+    """Return further channels of a bag, (N, D) by name, NaN between messages.
+
+    Parameters
+    ----------
+    bag : Bag
+    joints : tuple of D str
+        What the bag calls the drives.
+    stamps : (N,) array of int
+        Of the samples [ns]; a message counts for the one that is next.
+    """
+    def has_channels(connection: Connection) -> bool:
+        if connection.msgtype != DYNAMIC:
+            return channel_of(connection.topic, connection.msgtype) is not None
+        return any(quantity in CHANNELS for *_, message in bag.decoded([connection], 1)
+                   for _, quantity, *_ in states_of(message, DYNAMIC))
+
+    chosen = [connection for connection in bag.connections if has_channels(connection)]
+    if not chosen or not len(stamps):
+        return {}
+    order = np.argsort(stamps, kind='stable')
+    series: dict[tuple[str, str], list[tuple[int, float]]] = defaultdict(list)
+    for connection, received, message in bag.decoded(chosen):
+        for joint, quantity, value, _ in states_of(message, connection.msgtype, connection.topic,
+                                                   joints):
+            if quantity in CHANNELS and joint in ('', *joints) and np.isfinite(value):
+                series[quantity, joint].append((stamp_of(message) or received, float(value)))
+    found: dict[str, Array] = {}
+    # What a drive has of its own counts for more than what is measured for all.
+    for (channel, joint), read in sorted(series.items(), key=lambda one: bool(one[0][1])):
+        array = found.setdefault(channel, np.full((len(stamps), len(joints)), np.nan))
+        place = joints.index(joint) if joint else slice(None)
+        times, values = zip(*read, strict=True)
+        rows = order[np.minimum(np.searchsorted(stamps, times, sorter=order), len(stamps) - 1)]
+        column = np.full(len(stamps), np.nan)
+        column[rows] = values
+        array[:, place] = column[:, None] if not joint else column
+    return found
 
 
 def at_stamps(stamps: Indices, times: Sequence[int] | Indices,

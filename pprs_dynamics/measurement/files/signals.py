@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices, Mask, Samples
-from pprs_dynamics.measurement.files.stamps import runs, stretches
+from pprs_dynamics.measurement.files.stamps import runs
 
 # A step of position this many times faster than 99 % of all, and than its own surroundings, is
 # no motion: real motion gains speed over several samples.
@@ -103,7 +103,7 @@ def far_from_the_rest(values: Array, longest: int) -> Mask:
     return found
 
 
-def frozen_runs(samples: Samples, starts: Indices) -> list[tuple[int, int]]:
+def frozen_runs(samples: Samples) -> list[tuple[int, int]]:
     """Return (first, last) samples between which every value of every drive is repeated.
 
     Only where some effort is measured: positions alone stay the same whenever a robot rests.
@@ -112,15 +112,14 @@ def frozen_runs(samples: Samples, starts: Indices) -> list[tuple[int, int]]:
     if samples.velocity is not None:
         same &= _repeats(samples.velocity)
     same &= np.any(np.isfinite(samples.effort), axis=1)[1:]
-    return _lasting(samples.time, same, starts, FROZEN_TIME, FROZEN_SAMPLES)
+    return _lasting(samples.time, same, FROZEN_TIME)
 
 
-def stuck_efforts(samples: Samples, starts: Indices, drive: int) -> list[tuple[int, int]]:
+def stuck_efforts(samples: Samples, drive: int) -> list[tuple[int, int]]:
     """Return (first, last) samples between which a drive moves and its effort stays the same."""
     effort = samples.effort[:, drive]
     same = effort[1:] == effort[:-1]
-    stuck = _lasting(samples.time, same, starts, STUCK_TIME, FROZEN_SAMPLES)
-    return [(first, last) for first, last in stuck
+    return [(first, last) for first, last in _lasting(samples.time, same, STUCK_TIME)
             if len(np.unique(samples.position[first:last + 1, drive])) > STUCK_POSITIONS]
 
 
@@ -220,15 +219,8 @@ def _repeats(values: Array) -> Mask:
     return same
 
 
-def _lasting(
-    time: Array, same: Mask, starts: Indices, least_time: float, least_samples: int,
-) -> list[tuple[int, int]]:
-    """Return (first, last) samples of runs of repeats that last, within stretches."""
-    found = []
-    for part in stretches(starts, len(time)):
-        for run in runs(same[part.start:part.stop - 1]):
-            # The sample before the first repeat is the first of those that are the same.
-            first, last = part.start + run[0], part.start + run[1] + 1
-            if time[last] - time[first] >= least_time and last - first >= least_samples:
-                found.append((first, last))
-    return found
+def _lasting(time: Array, same: Mask, least: float) -> list[tuple[int, int]]:
+    """Return (first, last) samples of runs of repeats that last some time [s]."""
+    # The sample before the first repeat is the first of those that are the same.
+    return [(first, last + 1) for first, last in runs(same)
+            if time[last + 1] - time[first] >= least and last + 1 - first >= FROZEN_SAMPLES]

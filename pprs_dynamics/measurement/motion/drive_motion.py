@@ -29,7 +29,6 @@ from pprs_dynamics.measurement.motion.treatment import (
     block_length,
     motion_bandwidth,
 )
-from pprs_dynamics.system.plain_text import counted
 
 # Readers of files take a while to import, and a live node reads none.
 if TYPE_CHECKING:
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.
 SPARSE_EFFORTS = 0.5
-LEAST_MEANS = 100  # of poses that are held: statistics need as many
 
 
 @dataclass(frozen=True)
@@ -145,24 +143,25 @@ def smooth_drives(recording: Recording, window: float | None = None,
 
 
 def _held_poses(recording: Recording) -> DriveMotion:
-    """Return poses that are held, a block each, as motion without velocity and acceleration."""
+    """Return poses that are held, a block each, as motion without velocity and acceleration.
+
+    Static friction is the same in all samples of a pose: they are no more than one measurement.
+    """
     parts = recording.segments
     index = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     position = np.concatenate([np.broadcast_to(
         recording.position[part].mean(axis=0), recording.position[part].shape) for part in parts])
     lengths, still = np.array([part.stop - part.start for part in parts]), np.zeros_like(position)
     firsts = np.cumsum(lengths) - lengths
-    means = -(-LEAST_MEANS // len(parts))  # of each pose
-    starts = np.unique([firsts + k * lengths // means for k in range(means)])
     noise = np.std(recording.position[index] - position, axis=0)
     step = float(np.median(np.diff(recording.time[index])))
     return DriveMotion(
         position, still, still, index, (slice(0, len(index)),),
-        starts, int(np.diff(starts).max()),
+        firsts, int(lengths.max()),
         Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
         (SamplingGrid(step, np.arange(len(index), dtype=float), 0.0, 0),),
         np.zeros((2, position.shape[1]), dtype=bool),
-        (f'{len(parts)} poses are held: each counts by {counted(means, "mean")} of its effort',))
+        (f'{len(parts)} poses are held: each counts by the mean of its effort',))
 
 
 def smoothed_again(motion: DriveMotion, recording: Recording,

@@ -53,7 +53,7 @@ class LiveReconstruction:
     stamps are uneven, the motion is the smoother one of that with samples at their stamps and
     that with samples at equal steps, which came late. Where one or two samples are missing it is
     that of the others. The platform's motion then follows by
-    `solve_forward_motion`, seeded with the last pose.
+    `ThreePprs.motion_of_drives`, from the last pose on.
 
     Parameters
     ----------

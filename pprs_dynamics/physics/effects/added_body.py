@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from math import inf
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -23,28 +23,6 @@ AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz'
 OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
 KEPT = 0.05  # of a body that cannot be taken off it
 LARGEST = 1e3  # [kg]
-
-
-class Place(NamedTuple):
-    """Where a body may be: what names of its parameters begin with, and the rest of a `BodyPlace`.
-
-    Parameters
-    ----------
-    prefix : str
-    link, centre, mass, is_spread
-        See `BodyPlace`.
-    """
-
-    prefix: str
-    link: str
-    centre: tuple[float, float, float]
-    mass: float
-    is_spread: bool
-
-    @classmethod
-    def of(cls, place: BodyPlace, prefix: str = '') -> Place:
-        """Return a place in a robot."""
-        return cls(prefix, *place)
 
 
 def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
@@ -80,12 +58,12 @@ class AddedBody(BodyEffect):
 
     Class attributes
     ----------------
-    places : tuple of Place
+    places : tuple of BodyPlace
     has_extent : bool
         Whether centres and inertias are parameters, too.
     """
 
-    places: ClassVar[tuple[Place, ...]] = ()
+    places: ClassVar[tuple[BodyPlace, ...]] = ()
     has_extent = True
     idealised = False
 
@@ -95,7 +73,7 @@ class AddedBody(BodyEffect):
 
     @classmethod
     @cache
-    def on(cls, places: tuple[Place, ...],
+    def on(cls, places: tuple[BodyPlace, ...],
            alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
         """Return the effect with these places on a mechanism that moves so much mass.
 
@@ -106,8 +84,9 @@ class AddedBody(BodyEffect):
         linear: list[Parameter] = []
         coefficients: list[Parameter] = []
         names: list[tuple[str, ...]] = []
-        for prefix, link, centre, weight, is_spread in places:
-            count = 1 if is_spread else None
+        for place in places:
+            link, centre, weight, is_spread = place
+            prefix, count = cls.prefix_of(place), 1 if is_spread else None
             linear += body_parameters(prefix, link, centre, weight)[:count]
             coefficients += body_coefficients(prefix, link, moved)[:count]
             mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
@@ -137,7 +116,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().to_coefficients(values)
         found = cls._shared(values)
-        for prefix, _, centre, *_ in cls._bodies():
+        for prefix, centre in cls._bodies():
             for axis, at in zip(AXES, centre, strict=True):
                 away = values.get(f'{prefix}{axis}', at) - at
                 found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
@@ -149,7 +128,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().from_coefficients(coefficients)
         found = cls._shared(coefficients)
-        for prefix, _, centre, *_ in cls._bodies():
+        for prefix, centre in cls._bodies():
             mass = found[f'{prefix}mass']
             for axis, at in zip(AXES, centre, strict=True):
                 moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
@@ -163,27 +142,32 @@ class AddedBody(BodyEffect):
         By name of a coefficient: weights of coefficients.
         """
         return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
-                for prefix, _, centre, *_ in cls._bodies()
+                for prefix, centre in cls._bodies()
                 for axis, at in zip(AXES, centre, strict=True)}
 
     @classmethod
     def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
         """Return masses and inertias, which are parameters and coefficients alike."""
         return {name: values.get(name, 0.0) for place in cls.places
-                for name in (f'{place.prefix}{one}' for one in (
+                for name in (f'{cls.prefix_of(place)}{last}' for last in (
                     ('mass',) if place.is_spread else ('mass', *MOMENTS, *PRODUCTS)))}
 
     @classmethod
-    def _bodies(cls) -> list[Place]:
-        """Return the places at which a body has a centre and an inertia of its own."""
-        return [place for place in cls.places if not place.is_spread]
+    def prefix_of(cls, place: BodyPlace) -> str:
+        """Return what the names of the parameters at a place begin with."""
+        return f'{place.link}.' if cls.is_of_one_place else ''
+
+    @classmethod
+    def _bodies(cls) -> list[tuple[str, tuple[float, float, float]]]:
+        """Return prefix and centre of the places at which a body has a centre and an inertia."""
+        return [(cls.prefix_of(place), place.centre) for place in cls.places if not place.is_spread]
 
     @classmethod
     def around(cls, rows: Mapping[int, Array], coefficients: Mapping[str, float],
                ) -> dict[int, Array]:
         """Return columns by drive, exact for the bodies of some coefficients."""
         found = dict(rows)
-        for prefix, *_ in cls._bodies():
+        for prefix, _ in cls._bodies():
             if mass := coefficients.get(f'{prefix}mass', 0.0):
                 away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
                                  for axis in AXES])
@@ -219,8 +203,9 @@ class AddedBody(BodyEffect):
 
     def changed(self, robot: Any) -> Any:
         """Return the robot with the bodies."""
-        for prefix, link, centre, _, is_spread in self.places:
-            if is_spread:
+        for place in self.places:
+            prefix, link = self.prefix_of(place), place.link
+            if place.is_spread:
                 robot = robot.heavier(link, self._linear[f'{prefix}mass'])
                 continue
             c = [self._linear[f'{prefix}{name}'] for name in (
@@ -231,10 +216,10 @@ class AddedBody(BodyEffect):
             xx, yy, zz, xy, xz, yz = c[4:]
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             if mass:
-                body = body_at(mass, tuple(np.array(centre) + moment / mass), inertia)
+                body = body_at(mass, tuple(np.array(place.centre) + moment / mass), inertia)
             else:
                 # What a body of some mass changes by where its centre does.
-                inertia = inertia + _turned(np.array(centre), moment)
+                inertia = inertia + _turned(np.array(place.centre), moment)
                 body = np.array([0.0, *moment, *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
             robot = robot.with_body(link, body)
         return robot

@@ -272,7 +272,15 @@ class MeasurementEffect(DriveEffect):
         return tuple(np.zeros_like(drive.velocity) for _ in cls.coefficients)
 
     @classmethod
-    def sensor_columns(cls, effort: Array, time: Array | None, /, **shape: float,
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
+        """Return the measured effort of one drive that applies `effort`, (N,) [N].
+
+        An effect with memory finds it in `drive.memory` and advances it to the last sample.
+        """
+        return effort
+
+    @classmethod
+    def sensor_columns(cls, effort: Array, drive: DriveSamples, **shape: float,
                        ) -> tuple[Array, ...]:
         """Return what the sensor adds to an effort per coefficient, (N,) each.
 
@@ -281,24 +289,18 @@ class MeasurementEffect(DriveEffect):
         Parameters
         ----------
         effort : (N,) array
-            Of one drive, as the sensor would see it without the effect [N].
-        time : (N,) array or None
-            [s]
+            Of the drive, as the sensor would show it without the effect [N].
+        drive : DriveSamples
         """
-        columns = []
-        for unit in cls.coefficients or (None,):
-            given = {c.name: float(c is unit) for c in cls.coefficients}
-            effect = cls({ALONE: {**cls.from_coefficients(given), **shape}})
-            columns.append(effect.sensed(effort[:, None], time, (ALONE,))[:, 0] - effort)
-        return tuple(columns)
+        units = [{c.name: float(c is unit) for c in cls.coefficients}
+                 for unit in cls.coefficients or (None,)]
+        return tuple(cls.sense(effort, drive, **cls.from_coefficients(unit), **shape) - effort
+                     for unit in units)
 
     @classmethod
-    def sensor_deviations(cls, effort: Array, time: Array | None, /, **shape: float,
+    def sensor_deviations(cls, effort: Array, drive: DriveSamples, **shape: float,
                           ) -> tuple[Array, ...]:
-        """Return how what real sensors add departs from the form, (N,) each; see `deviations`.
-
-        Of effort and time as `sensor_columns` has them.
-        """
+        """Return how what real sensors add departs from the form, (N,) each; see `deviations`."""
         return ()
 
     @classmethod
@@ -371,50 +373,11 @@ class MeasurementEffect(DriveEffect):
         """
         return np.zeros_like(windup)
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
+    def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         measured = effort.copy()
         for name, parameters in self.drives.items():
-            k = drives.index(name)
-            measured[:, k] = self.drive_sensed(
-                effort[:, k], time, parameters,
-                self.drive_memory() if memory is None else memory[name])
+            k = state.drives.index(name)
+            samples = DriveSamples.of(state, k, None if memory is None else memory[name])
+            measured[:, k] = self.sense(effort[:, k], samples, **parameters)
         return measured
-
-    @classmethod
-    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
-                     memory: Any) -> Array:
-        """Return the measured effort of one drive that applies `effort`, (N,) [N]."""
-        return effort
-
-    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
-        """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
-        return self.sensed(effort, state.time, state.drives, memory)
-
-
-class GainEffect(MeasurementEffect):
-    """A factor between efforts and what is measured that goes with what the drive does."""
-
-    @classmethod
-    @abstractmethod
-    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return what is measured too much per coefficient, as shares of the effort, (N,) each."""
-
-    def factor(self, samples: DriveSamples, drive: str) -> Array:
-        """Return by what the efforts of one drive are multiplied, (N,)."""
-        values = self.drives[drive]
-        coefficients = self.to_coefficients(values)
-        shares = self.shares(samples, **{p.name: values[p.name] for p in self.shape})
-        factor = np.ones_like(samples.velocity)
-        for c, share in zip(self.coefficients, shares, strict=True):
-            factor += coefficients[c.name] * share
-        return factor
-
-    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
-        """Return the efforts times their factors."""
-        scaled = effort.copy()
-        for name in self.drives:
-            index = state.drives.index(name)
-            scaled[:, index] *= self.factor(DriveSamples.of(state, index), name)
-        return scaled

@@ -20,8 +20,8 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
 from pprs_dynamics.system.plain_text import displayed
 
 METHODS = (
-    '__init__', 'from_file', 'to_coefficients', 'from_coefficients', 'columns', 'shares',
-    'force', 'changed', 'load', 'apply', 'sensed', 'seen', 'position_error',
+    '__init__', 'from_file', 'to_coefficients', 'from_coefficients', 'columns', 'force',
+    'changed', 'load', 'apply', 'sense', 'measured', 'position_error',
     'loaded_position_error', 'drive_memory', 'begin', 'initial_memory', 'continued_memory',
     'check_memory', 'sensor_columns', 'shifts_positions', 'trials', 'alternatives', 'averaged')
 

@@ -52,19 +52,17 @@ def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
 @cache
 def compiled_function(function: FunctionType) -> Callable[..., Any]:
     """Return a function compiled for the arguments that it gets, kept on disk."""
+    return _stored(_keyed(_bound(function), function))
+
+
+def _stored(function: FunctionType) -> Callable[..., Any]:
+    """Return a function compiled and kept on disk."""
     import numba
 
     # It makes no arrays, so that nothing needs to count references to those that it gets.
     compiled: Callable[..., Any] = numba.njit(
-        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, _nrt=False)(
-            _keyed(_bound(function, _compiled_without_references), function))
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, _nrt=False)(function)
     return compiled
-
-
-@cache
-def _compiled_without_references(function: FunctionType) -> Any:
-    """Return a function of this package, and all that it calls, for functions without arrays."""
-    return _inlined(_bound(function, _compiled_without_references), _nrt=False)
 
 
 def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
@@ -134,16 +132,11 @@ def _template(row: Any, *tables: Any) -> int:
 
 
 def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
-    import numba
-
     reader = _reader(named)
     own = {'kernel': _compiled(kernel), 'read': _inlined(reader)}
     loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
                         f'{kernel.__module__}_{kernel.__name__}'.replace('.', '_'))
-    compiled: Callable[..., int] = numba.njit(
-        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(
-            _keyed(loop, _template, kernel, reader))
-    return compiled
+    return _stored(_keyed(loop, _template, kernel, reader))
 
 
 def _reader(named: tuple[Any, ...]) -> Any:
@@ -169,15 +162,15 @@ def _reader(named: tuple[Any, ...]) -> Any:
 @cache
 def _compiled(function: FunctionType) -> Any:
     """Return a function of this package, and all that it calls, for Numba."""
-    return _inlined(_bound(function, _compiled))
+    return _inlined(_bound(function))
 
 
-def _bound(function: FunctionType, compile_one: Callable[[Any], Any]) -> FunctionType:
+def _bound(function: FunctionType) -> FunctionType:
     """Return a copy of a function whose callees of this package are compiled."""
     def callee(used: Any) -> Any:
         if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
             used = REPLACED.get(used, used)
-            return compile_one(used) if isinstance(used, FunctionType) else used
+            return _compiled(used) if isinstance(used, FunctionType) else used
         return used
 
     namespace = dict(function.__globals__)
@@ -190,14 +183,14 @@ def _bound(function: FunctionType, compile_one: Callable[[Any], Any]) -> Functio
     return bound
 
 
-def _inlined(function: FunctionType, **options: bool) -> Any:
+def _inlined(function: FunctionType) -> Any:
     """Return a function that Numba inlines where it is called."""
     import numba
 
     # Else their many results are copied through memory: four times slower. Nobody calls them from
     # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True, **options)(function)
+                      no_cfunc_wrapper=True, _nrt=False)(function)
 
 
 def _names(code: CodeType) -> set[str]:

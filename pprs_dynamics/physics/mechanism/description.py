@@ -180,9 +180,15 @@ def moved_along(joint: Joint, position: float) -> Frame:
     """Return the frame of a joint at a position in its frame at 0."""
     if joint.kind == PRISMATIC:
         return Frame(p=position * joint.axis)
-    x, y, z = joint.axis
+    return Frame(rotation_about(joint.axis, position))
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Return the rotation matrix of a turn about an axis of unit length."""
+    x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return Frame(np.eye(3) + np.sin(position) * K + (1 - np.cos(position)) * (K @ K))
+    R: Array = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+    return R
 
 
 def inertial_in(frame: Frame, parameters: Array) -> Array:

@@ -32,9 +32,9 @@ FEW = 8  # samples, up to which floats are faster than arrays
 # Loading what is compiled takes 0.9 s of processor time; on arrays a sample takes 1 us more, a call
 # 0.1 ms.
 PAYS, CALL = 500_000, 100  # samples
-# A function over the tables of a mechanism takes longer without a compiler: on arrays a sample
-# 0.1 ms and a call 20 ms (hexapod); of few samples on floats each 5 ms.
-TREE_SAMPLE, TREE_CALL, TREE_ON_FLOATS = 100, 20_000, 5_000  # of such samples
+# A function over the tables of a mechanism takes longer without a compiler: on arrays motion and
+# forces each 0.05 ms a sample and 10 ms a call (hexapod); of few samples on floats each 5 ms.
+TREE_SAMPLE, TREE_CALL, TREE_ON_FLOATS = 50, 10_000, 5_000  # of such samples
 TREE_FEW = 4
 
 _loops: dict[Kernel, Callable[..., int]] = {}

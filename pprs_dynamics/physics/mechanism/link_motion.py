@@ -15,7 +15,12 @@ from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import OPEN_IN_MOTION, WORST_CONDITION, residual
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    OPEN_IN_MOTION,
+    WORST_CONDITION,
+    joint_friction,
+    residual,
+)
 from pprs_dynamics.physics.mechanism.tree_evaluation import samples_last
 from pprs_dynamics.physics.mechanism.tree_tables import (
     CONDITION,
@@ -120,17 +125,32 @@ class LinkMotion:
     @cached_property
     def link_jacobians(self) -> tuple[Array, Array]:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
-        return self.structure.evaluation.link_jacobians(self.rows)
+        t, m = self.structure.tables, self.motion
+        W, U = np.zeros((2, len(m.q), len(t.parent), 3, len(t.drives)))
+        for j in range(1, len(t.parent)):
+            i = t.parent[j]
+            W[:, j] = W[:, i]
+            U[:, j] = U[:, i] + np.cross(W[:, i], (m.p[:, j] - m.p[:, i])[..., None], axis=1)
+            own = W if t.turns[j] else U
+            own[:, j] += t.ratio[j] * (m.z[:, j, :, None]
+                                       * m.drive_to_joint[:, t.coordinate[j], None, :])
+        return W, U
 
     def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None) -> Loads:
         """Return what joints and closures transmit without friction; see `Evaluation.forces`."""
-        evaluation = self.structure.evaluation
-        return evaluation.loads(evaluation.forces(
-            self.rows, inertial, gravity, None if load is None else self.wrenches_of(load)))
+        return self.structure.evaluation.forces(
+            self.rows, inertial, gravity, {} if load is None else self.wrenches_of(load))
 
     def friction(self, loads: Loads, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints under loads, (N, D)."""
-        return self.structure.evaluation.friction(self.rows, loads, friction)
+        t = self.structure.tables
+        found = np.zeros((len(self.rows), len(t.drives)))
+        m, o = samples_last(self.motion), samples_last(loads)
+        # Loads are everybody's: what is of one friction alone does not go through them.
+        o = o._replace(tau_friction=np.empty_like(o.tau_friction))
+        with np.errstate(all='ignore'):
+            joint_friction(t, m, o, friction, found.T)
+        return found
 
     @property
     def tool_velocity(self) -> Array:

@@ -32,7 +32,9 @@ from pprs_dynamics.physics.mechanism.description import (
     Loop,
     Mimic,
     body_at,
+    rotation_about,
 )
+from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.urdf import WORLD, read_content, ring
 
 # Numbers of parts that a mechanism here has not got, and what they are.
@@ -165,7 +167,7 @@ class _Reader:
     def _body(self, b: int, links: dict[str, Array], joints: dict[str, Joint]) -> None:
         model = self.model
         parent = self.bodies[int(model.body_parentid[b])]
-        at = Frame(_matrix(self.mujoco, model.body_quat[b]), model.body_pos[b].copy())
+        at = Frame(_matrix(model.body_quat[b]), model.body_pos[b].copy())
         first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
         name = self.bodies[b]
         links[name] = self._inertial(b)
@@ -195,7 +197,7 @@ class _Reader:
                 lower, upper = (model.jnt_range[k] if model.jnt_limited[k] and len(axes) == 1
                                 else (-np.inf, np.inf))
                 back = (Frame(p=-ref * axis) if one == PRISMATIC
-                        else Frame(_turned(self.mujoco, axis, -ref)))
+                        else Frame(rotation_about(axis, -ref)))
                 joints[own] = Joint(
                     own, one, parent, child, at @ Frame(np.eye(3), place) @ back, axis,
                     float(lower), float(upper), effort=self._effort(k), start=ref or None,
@@ -250,7 +252,7 @@ class _Reader:
 
     def _inertial(self, b: int) -> Array:
         model = self.model
-        R = _matrix(self.mujoco, model.body_iquat[b])
+        R = _matrix(model.body_iquat[b])
         return body_at(float(model.body_mass[b]), tuple(model.body_ipos[b]),
                        R @ np.diag(model.body_inertia[b]) @ R.T)
 
@@ -276,7 +278,7 @@ class _Reader:
             if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 raise ModelError('robot.mjcf', name, 'be a connect, weld or joint constraint')
             if model.eq_objtype[e] == self.mujoco.mjtObj.mjOBJ_SITE:
-                frames = [Frame(_matrix(self.mujoco, model.site_quat[s]), model.site_pos[s].copy())
+                frames = [Frame(_matrix(model.site_quat[s]), model.site_pos[s].copy())
                           for s in (a, b)]
                 a, b = (int(model.site_bodyid[s]) for s in (a, b))
             elif kind == kinds.mjEQ_CONNECT:
@@ -284,7 +286,7 @@ class _Reader:
                           Frame(np.eye(3), numbers[3:6].copy())]
             else:
                 # A point and the attitude of the second body in the first, and that point in it.
-                frames = [Frame(_matrix(self.mujoco, numbers[6:10]), numbers[3:6].copy()),
+                frames = [Frame(_matrix(numbers[6:10]), numbers[3:6].copy()),
                           Frame(p=numbers[:3].copy())]
             loops.append(Loop(name, 'spherical' if kind == kinds.mjEQ_CONNECT else 'fixed',
                               self.bodies[a], frames[0], self.bodies[b], frames[1]))
@@ -305,14 +307,7 @@ class _Reader:
                                                     y + float(numbers[0]) - ratio * x))
 
 
-def _matrix(mujoco: Any, quaternion: Array) -> Array:
-    found = np.empty(9)
-    mujoco.mju_quat2Mat(found, np.asarray(quaternion, dtype=float))
-    return found.reshape(3, 3)
-
-
-def _turned(mujoco: Any, axis: Array, angle: float) -> Array:
-    """Return the rotation about an axis."""
-    quaternion = np.empty(4)
-    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
-    return _matrix(mujoco, quaternion)
+def _matrix(quaternion: Array) -> Array:
+    """Return the rotation of a quaternion w, x, y, z."""
+    w, x, y, z = quaternion
+    return rotation_matrix(x, y, z, w)

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.mechanism.motion_checks import (
     checked_times,
     normalised,
 )
-from pprs_dynamics.physics.mechanism.motion_sample import rotation
+from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
 
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
@@ -185,8 +185,7 @@ class PlatformMotion:
     @cached_property
     def rotation(self) -> Array:
         """Rotation matrices from `platform` to `base`, (N, 3, 3)."""
-        columns = rotation(*self.orientation.T)
-        return np.stack([np.stack(column, axis=-1) for column in columns], axis=-1)
+        return rotation_matrix(*self.orientation.T)
 
     @property
     def tilt(self) -> Array:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
 
@@ -49,6 +51,11 @@ def rotation(x: Value, y: Value, z: Value, w: Value) -> Rotation:
         Vector(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)),
         Vector(2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)),
         Vector(2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)))
+
+
+def rotation_matrix(x: Value, y: Value, z: Value, w: Value) -> Array:
+    """Return the matrix of a unit quaternion, (3, 3), or of N quaternions, (N, 3, 3)."""
+    return np.stack([np.stack(column, axis=-1) for column in rotation(x, y, z, w)], axis=-1)
 
 
 def turned(R: Rotation, a: Vector) -> Vector:

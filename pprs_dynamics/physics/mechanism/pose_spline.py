@@ -55,14 +55,8 @@ def spline_derivatives(
         For poses or times that are none, or fewer than four.
     """
     knots, places, turns = checked_poses(time, position, orientation)
-    try:
-        # Poses too far apart overflow; the result is then not finite.
-        with np.errstate(all='ignore'):
-            rows = spline_rows(knots, places, turns, knots)
-        return rows[:, 7:13], rows[:, 13:]
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-        unknown = np.full((len(knots), 6), np.nan)
-        return unknown, unknown
+    rows = spline_rows(knots, places, turns, knots)
+    return rows[:, 7:13], rows[:, 13:]
 
 
 def checked_poses(
@@ -105,20 +99,18 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
     (K, 19) array
         Columns of `PlatformMotion.rows`.
 
-    Raises
-    ------
-    ValueError, ArithmeticError, numpy.linalg.LinAlgError
-        Where poses or times are so far apart that no spline can be computed.
+    NaN throughout where poses or times are so far apart that no spline can be computed.
     """
     place, first, second = spline_through(
         knots, np.hstack((position, _continuous(orientation))), at)
     s = place[:, 3:]
-    square = np.sum(s * s, axis=1, keepdims=True)
-    omega = 2 * _vector_part(first[:, 3:], s) / square
-    growth = 2 * np.sum(s * first[:, 3:], axis=1, keepdims=True) / square
-    epsilon = 2 * _vector_part(second[:, 3:], s) / square - growth * omega
-    return np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
-                      second[:, :3], epsilon))
+    with np.errstate(all='ignore'):
+        square = np.sum(s * s, axis=1, keepdims=True)
+        omega = 2 * _vector_part(first[:, 3:], s) / square
+        growth = 2 * np.sum(s * first[:, 3:], axis=1, keepdims=True) / square
+        epsilon = 2 * _vector_part(second[:, 3:], s) / square - growth * omega
+        return np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
+                          second[:, :3], epsilon))
 
 
 def spline_through(knots: Array, values: Array, at: Array) -> tuple[Array, Array, Array]:
@@ -132,15 +124,17 @@ def spline_through(knots: Array, values: Array, at: Array) -> tuple[Array, Array
     at : (K,) array
         [s].
 
-    Raises
-    ------
-    ValueError, ArithmeticError, numpy.linalg.LinAlgError
-        Where values or times are so far apart that no spline can be computed.
+    NaN throughout where values or times are so far apart that no spline can be computed.
     """
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(knots, values, k=5 if len(knots) >= QUINTIC_FROM else 3)
-    return spline(at), spline.derivative(1)(at), spline.derivative(2)(at)
+    try:
+        with np.errstate(all='ignore'):
+            spline = make_interp_spline(knots, values, k=5 if len(knots) >= QUINTIC_FROM else 3)
+            return spline(at), spline.derivative(1)(at), spline.derivative(2)(at)
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        unknown = np.full((len(at), values.shape[1]), np.nan)
+        return unknown, unknown, unknown
 
 
 def _continuous(quaternion: Array) -> Array:

@@ -38,6 +38,7 @@ from pprs_dynamics.physics.mechanism.elimination import (
     with_actuated_coordinates,
     with_elimination_order,
 )
+from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
 from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
 
@@ -516,7 +517,4 @@ def path_to_base(parent: Sequence[int] | Integers, row: int) -> list[int]:
 def pose_frame(pose: tuple[float, ...]) -> Frame:
     """Return the frame of x y z qx qy qz qw, the quaternion of any length."""
     x, y, z, w = np.array(pose[3:]) / np.linalg.norm(pose[3:])
-    R = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                  [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                  [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-    return Frame(R, np.array(pose[:3], dtype=float))
+    return Frame(rotation_matrix(x, y, z, w), np.array(pose[:3], dtype=float))

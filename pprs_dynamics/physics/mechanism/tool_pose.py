@@ -66,12 +66,10 @@ class ToolPose:
         t, home = structure.tables, structure.home
         row, frame = structure.links[structure.tool]
         q = home[None, t.drives]
-        rows, _ = structure.evaluation.forward_kinematics(q, np.zeros_like(q), np.zeros_like(q))
-        m = structure.evaluation.motion(rows)
+        at_home = LinkMotion.of(structure, q, np.zeros_like(q), np.zeros_like(q))
+        m, (W, U) = at_home.motion, (each[0, row] for each in at_home.link_jacobians)
         self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
-        W, U = (each[0, row] for each in structure.evaluation.link_jacobians(rows))
-        lever = m.R[0, row] @ frame.p
-        linear, angular = U + np.cross(W, lever, axis=0), W
+        linear, angular = U + np.cross(W, m.R[0, row] @ frame.p, axis=0), W
         self.chosen = _independent(np.vstack((linear / structure.size,
                                               (self.home.R.T @ angular)[::-1])))
         if not structure.loops or len(self.chosen) < len(t.drives):

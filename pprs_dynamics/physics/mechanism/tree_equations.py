@@ -568,28 +568,6 @@ def constraint_forces(t: Model, m: Data, o: Loads) -> None:
             increase(o.links, OF_FORCES * j + MOMENT, times(-sign, plus(N, product(arm, F))))
 
 
-def link_jacobians(t: Model, m: Data, of_turns: Any, of_origins: Any) -> None:
-    """Fill in angular and linear velocity of each link per rate of each drive, (3 (J + 1), D)."""
-    drives = len(t.drives)
-    for c in range(3):
-        for d in range(drives):
-            of_turns[c, d] = of_origins[c, d] = 0.0
-    for j in range(1, len(t.joints)):
-        at, i, k = OF_LINK * j, t.joints[j, PARENT], t.joints[j, COORDINATE]
-        arm = minus(vector(m.links, at + P), vector(m.links, OF_LINK * i + P))
-        z = vector(m.links, at + Z)
-        for d in range(drives):
-            w = column(of_turns, 3 * i, d)
-            u = plus(column(of_origins, 3 * i, d), product(w, arm))
-            own = times(t.ratio[j] * m.drive_to_joint[k, d], z)
-            if t.joints[j, TURNS]:
-                w = plus(w, own)
-            else:
-                u = plus(u, own)
-            put_column(of_turns, 3 * j, d, w)
-            put_column(of_origins, 3 * j, d, u)
-
-
 def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     """Fill in rigid-body effort, drive friction and the total of D drives.
 

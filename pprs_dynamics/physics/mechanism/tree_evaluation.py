@@ -19,14 +19,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import elements
 from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
-from pprs_dynamics.physics.mechanism.packed import (
-    length_of,
-    packed_tables,
-    read_loads,
-    read_motion,
-    read_tables,
-    views,
-)
 from pprs_dynamics.physics.mechanism.tree_equations import (
     WARM_STEPS,
     actuator_efforts,
@@ -38,7 +30,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     is_regular_and_closed,
     jacobian,
     joint_friction,
-    link_jacobians,
     predict,
     residual,
     update_frame_placements,
@@ -56,6 +47,12 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     JointFriction,
     Loads,
     Model,
+    length_of,
+    packed_tables,
+    read_loads,
+    read_motion,
+    read_tables,
+    views,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -136,12 +133,6 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
     return -1
 
 
-def _link_jacobians(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
-    t = read_tables(sizes, integers, reals)
-    for s in range(len(motions)):
-        link_jacobians(t, read_motion(sizes, motions[s], reals), W[s], U[s])
-
-
 class Evaluation:
     """A mechanism's equations for what it is given.
 
@@ -176,10 +167,6 @@ class Evaluation:
         """Return by name what rows of `forward_kinematics` hold."""
         return views(Data, self.sizes, rows)
 
-    def loads(self, rows: Array) -> Loads:
-        """Return by name what rows of `forces` hold."""
-        return views(Loads, self.sizes, rows)
-
     def forward_kinematics(self, q: Array, v: Array, a: Array, start: Array | None = None,
                            nearby: Array | None = None) -> tuple[Array, int]:
         """Return the motion of all links for positions, velocities and accelerations of the drives.
@@ -205,35 +192,25 @@ class Evaluation:
         return rows, failed
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
-               wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
-        """Return what joints and closures transmit, (N, K), for rows of `forward_kinematics`.
+               wrenches: Mapping[int, tuple[Array, Array]]) -> Loads:
+        """Return what joints and closures transmit, for rows of `forward_kinematics`.
 
         Parameters
         ----------
         rows : (N, K) array
         inertial : (J + 1, 10) array
         gravity : (3,) array
-        wrenches : mapping of int to (force, moment), (N, 3) each, optional
+        wrenches : mapping of int to (force, moment), (N, 3) each
             That links apply to the world, by the joints that move them, in the base's frame, about
             the origins of these joints [N, N m].
         """
         loads = np.zeros((len(rows), self._lengths[1]))
-        o = self.loads(loads)
-        for joint, (force, moment) in (wrenches or {}).items():
+        o = views(Loads, self.sizes, loads)
+        for joint, (force, moment) in wrenches.items():
             o.f[:, joint] += force
             o.n[:, joint] += moment
         self._run(None, None, rows, FORCES | KEPT, gravity, None, inertial, loads)
-        return loads
-
-    def friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
-        """Return the drives' efforts (N, D) against friction of joints under loads."""
-        found = np.zeros((len(rows), len(self.tables.drives)))
-        m, o = samples_last(self.motion(rows)), samples_last(loads)
-        # Loads are everybody's: what is of one friction alone does not go through them.
-        o = o._replace(tau_friction=np.empty_like(o.tau_friction))
-        with np.errstate(all='ignore'):
-            joint_friction(self.tables, m, o, friction, found.T)
-        return found
+        return o
 
     def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
                          gravity: Array, friction: JointFriction,
@@ -256,7 +233,8 @@ class Evaluation:
         Returns
         -------
         InverseDynamicsResult or None
-            None where a sample is out of reach or singular: `forward_kinematics` says which.
+            None where a sample is out of reach or singular, which `forward_kinematics` says, and
+            of many samples that are not evaluated by compiled code.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
@@ -266,18 +244,6 @@ class Evaluation:
             inertial, np.empty((1, self._lengths[1])), friction,
             self._no_actuators if actuators is None else actuators, closed, efforts)
         return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
-
-    def link_jacobians(self, rows: Array) -> tuple[Array, Array]:
-        """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
-        t = self.tables
-        W, U = np.zeros((2, len(rows), 3 * len(t.joints), len(t.drives)))
-        loop = compiled_or_none(_link_jacobians, len(rows))
-        if loop is not None:
-            loop(*self.packed, rows, W, U)
-        else:
-            link_jacobians(t, samples_last(self.motion(rows)), *samples_last((W, U)))
-        shape = len(rows), len(t.joints), 3, len(t.drives)
-        return W.reshape(shape), U.reshape(shape)
 
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
              gravity: Array, nearby: Array | None, inertial: Array | None = None,
@@ -302,43 +268,33 @@ class Evaluation:
         arguments = (
             *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
             loads, last[1], last[2], actuators, closed, efforts, stages, warm)
-        loop = compiled_or_none(_evaluate, len(closed))
+        are_few = len(closed) <= TREE_FEW
+        loop = compiled_or_none(_evaluate, len(closed) if are_few or stages & KEPT else 0)
         if loop is not None:
             return int(loop(*arguments))
-        if len(closed) <= TREE_FEW:
+        if are_few:
             try:
                 return _evaluate(*arguments)
             except (ZeroDivisionError, OverflowError, ValueError):
                 pass  # arrays answer with infinities instead
+        if not stages & KEPT:
+            return 0  # arrays keep the rows of all samples
         with np.errstate(all='ignore'):
-            return self._run_on_arrays(given, start, rows, stages, gravity, at_home, inertial,
-                                       loads, friction, actuators, closed, efforts)
+            return self._run_on_arrays(given, start, rows, stages, gravity, inertial, loads)
 
     def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
-                       gravity: Array, at_home: Array, inertial: Array, loads: Array,
-                       friction: JointFriction, actuators: Array, closed: Array,
-                       efforts: Array) -> int:
+                       gravity: Array, inertial: Array, loads: Array) -> int:
         t = self.tables
-        if not stages & KEPT:
-            rows, loads = (np.zeros((len(closed), each.shape[1])) for each in (rows, loads))
-        m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
-        q, v, a = np.moveaxis(given, 1, -1)
+        m, o = samples_last(self.motion(rows)), samples_last(views(Loads, self.sizes, loads))
         if stages & MOTION:
+            q, v, a = np.moveaxis(given, 1, -1)
             if not close_loops(t, m, self.home if start is None else start.T, q):
                 size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             forward_kinematics(t, m, v, a)
-            closed[:] = m.q.T
-            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
-                return 0
         if stages & FORCES:
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            if not stages & KEPT:
-                own = np.moveaxis(efforts, 1, -1)
-                own[TRANSMITTED] = o.efforts
-                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
-                actuator_efforts(actuators, v, a, own)
         return -1
 
 

@@ -3,12 +3,17 @@
 
 """Tables of a tree of joints with closures: what it is, how it moves, and what it transmits.
 
-Row 0 of all tables of joints is the base.
+Row 0 of all tables of joints is the base. Tables are also packed as rows of numbers, because
+compiled code takes few arrays faster than many: shapes are stated once, by names of sizes. Space
+for a motion is a row per sample, or one row that every sample uses in turn.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -226,3 +231,102 @@ class JointFriction(NamedTuple):
 # Rows of the parameters of drives, and of the efforts that follow from them.
 ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+
+
+# Names of the numbers of rows of the tables, and of the columns of some.
+SIZES = ('frames', 'joints', 'coordinates', 'drives', 'passive', 'loops', 'closure_frames', 'rows',
+         'path', 'starts', 'swap', 'below', 'right', 'links', 'forces', 'loop_forces', 'solved')
+
+
+def _sizes_of(t: Model) -> Integers:
+    """Return the numbers that `SIZES` names, of tables."""
+    found = {name: rows for table, shape in SHAPES[Model].items()
+             for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
+    found |= {'links': OF_LINK * len(t.joints), 'forces': OF_FORCES * len(t.joints),
+              'loop_forces': OF_FORCES * len(t.closures), 'solved': len(t.passive) + len(t.drives)}
+    return np.array([found[name] for name in SIZES], dtype=np.int64)
+
+
+SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
+    Model: {
+        'joints': ('joints', 3), 'passive': ('passive',), 'drives': ('drives',),
+        'places': ('coordinates', 2), 'closures': ('loops', 4), 'rows': ('rows', 6),
+        'path': ('path', 2), 'starts': ('starts', 3), 'swap': ('swap',), 'below': ('below',),
+        'right': ('right',), 'frames': ('frames', 3), 'ratio': ('joints',),
+        'offset': ('joints',), 'stride': ('drives',), 'closure_frames': ('closure_frames', 3),
+        'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
+    Data: {
+        'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
+        'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
+        'inverse': ('passive', 'solved'), 'solution': (4,), 'J': ('passive', 'passive'),
+        'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
+    Loads: {
+        'links': ('forces', 3), 'loops': ('loop_forces', 3), 'tau': ('coordinates',),
+        'tau_friction': ('coordinates',), 'efforts': ('drives',)}}
+FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
+N = TypeVar('N', bound=tuple[Any, ...])
+
+
+class PackedTables(NamedTuple):
+    """Tables as rows of numbers: their sizes, whole numbers, and others."""
+
+    sizes: Integers
+    integers: Integers
+    reals: Array
+
+
+def packed_tables(t: Model) -> PackedTables:
+    """Return tables as rows of numbers."""
+    first = Model._fields.index(FIRST_OF_REALS)
+    return PackedTables(_sizes_of(t), np.concatenate([np.ravel(values) for values in t[:first]]),
+                        np.concatenate([np.ravel(values) for values in t[first:]]))
+
+
+def length_of(kind: type, sizes: Integers) -> int:
+    """Return how many numbers a row of a named tuple has."""
+    return _places(kind, tuple(sizes.tolist()))[-1][1]
+
+
+def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
+    """Return what rows (N, K) hold by name, the samples first."""
+    return kind(*(table[:, start:end].reshape(len(table), *shape) for start, end, shape in _places(
+        kind, tuple(sizes.tolist()))))
+
+
+@cache
+def _places(kind: type, sizes: tuple[int, ...]) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
+    by_name = dict(zip(SIZES, sizes, strict=True))
+    found, start = [], 0
+    for shape in SHAPES[kind].values():
+        numbers = tuple(by_name[n] if isinstance(n, str) else n for n in shape)
+        found.append((start, start + math.prod(numbers), numbers))
+        start += math.prod(numbers)
+    return tuple(found)
+
+
+def _reader(kind: type) -> Callable[..., Any]:
+    """Return a function that makes a named tuple of views of a row, for compiled code.
+
+    Its source is written out: Numba makes named tuples only where all their elements are.
+    """
+    lines = ['def read(sizes, row, more):', '    at = 0', *(
+        f'    {name} = sizes[{k}]' for k, name in enumerate(SIZES))]
+    for name, shape in SHAPES[kind].items():
+        if name == FIRST_OF_REALS:
+            lines.append('    at = 0')
+        source = 'more' if kind is Model and _is_real(name) else 'row'
+        count = ' * '.join(map(str, shape))
+        reshaped = f'.reshape(({", ".join(map(str, shape))}))' if len(shape) > 1 else ''
+        lines += [f'    of_{name} = {source}[at:at + {count}]{reshaped}', f'    at += {count}']
+    lines.append(f'    return Kind({", ".join(f"of_{name}" for name in SHAPES[kind])})')
+    namespace: dict[str, Any] = {'Kind': kind, '__name__': __name__}
+    exec('\n'.join(lines), namespace)
+    read: Callable[..., Any] = namespace['read']
+    return read
+
+
+def _is_real(name: str) -> bool:
+    return Model._fields.index(name) >= Model._fields.index(FIRST_OF_REALS)
+
+
+read_tables, read_motion, read_loads = (_reader(kind) for kind in (Model, Data, Loads))

@@ -17,6 +17,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TypeVar
 
@@ -371,14 +372,10 @@ def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, Joi
 
 def ring(following: dict[str, str]) -> list[str]:
     """Return names of which each follows the next and the last the first, [] for none."""
-    done: set[str] = set()
-    for start in following:
-        path: list[str] = []
-        name: str | None = start
-        while name is not None and name not in done:
-            done.add(name)
-            path.append(name)
-            name = following.get(name)
-        if name in path:
-            return path[path.index(name):]
+    try:
+        TopologicalSorter({name: (next_one,) for name, next_one in following.items()}).prepare()
+    except CycleError as error:
+        names: list[str] = error.args[1][:0:-1]
+        first = min(range(len(names)), key=lambda k: [*following].index(names[k]))
+        return names[first:] + names[:first]
     return []

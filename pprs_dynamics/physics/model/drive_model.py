@@ -485,7 +485,7 @@ class DriveModel:
         state = self.initial_state() if state is None else state
         for effect in sensors:
             memory = state.memories[effect.name]
-            after = (effect.seen(total, mechanism, memory)
+            after = (effect.measured(total, mechanism, memory)
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after

@@ -254,9 +254,9 @@ OF_JOINT = {
     'coulomb': Key('', 'dry friction over the load across the axis', '', lower=0, default=0.0),
     'radius': Key('', 'radius at which it acts; of a slide 1', 'm', lower=0, default=0.0)}
 POSE = '_pose'
-MOTORS = 'friction.motors.'
+JOINTS, MOTORS = 'friction.joints.', 'friction.motors.'
 NAMED_BLOCKS: dict[str, dict[str, Key]] = {
-    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}, LOCKED: {},
+    'robot.loops.': OF_LOOP, JOINTS: OF_JOINT, 'robot.home.': {}, LOCKED: {},
     MOTORS: {}}
 
 

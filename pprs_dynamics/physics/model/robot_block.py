@@ -31,7 +31,7 @@ from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, LOCKED, MOTORS, POSE
+from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, JOINTS, LOCKED, MOTORS, POSE
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.system.package_files import located
@@ -108,26 +108,15 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
 @lru_cache(maxsize=64)
 def _structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
                own: tuple[tuple[str, Any], ...]) -> Structure:
-    home: dict[str, float] = {}
-    poses: dict[str, Frame] = {}
-    locked: dict[str, float] = {}
-    loops: dict[str, dict[str, Any]] = {}
-    for key, value in own:
-        kind, _, name = key.removeprefix('robot.').partition('.')
-        if kind == 'loops':
-            name, _, rest = name.partition('.')
-            loops.setdefault(name, {})[rest] = value
-        elif kind == 'locked':
-            locked[name] = value
-        elif name.endswith(POSE):
-            if not np.linalg.norm(value[3:]) > 0:
-                raise ModelError(key, list(value), 'hold a quaternion that is not zero')
-            poses[name.removesuffix(POSE)] = pose_frame(value)
-        else:
-            home[name] = value
-    for name in poses:
-        if name not in description.links:
-            raise UnknownNameError('link', name, description.links, 'robot.home')
+    home, poses = _below(dict(own), 'robot.home.'), {}
+    for name in [name for name in home if name.endswith(POSE)]:
+        pose, link = home.pop(name), name.removesuffix(POSE)
+        if not np.linalg.norm(pose[3:]) > 0:
+            raise ModelError(f'robot.home.{name}', list(pose), 'hold a quaternion that is not zero')
+        if link not in description.links:
+            raise UnknownNameError('link', link, description.links, 'robot.home')
+        poses[link] = pose_frame(pose)
+    loops = _blocks_below(dict(own), 'robot.loops.')
     for loop in description.loops:
         if loop.name in loops:
             raise ModelError(f'robot.loops.{loop.name}', loop.kind, 'not stand in the file as '
@@ -135,14 +124,29 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
     closures = (*description.loops, *(Loop(
         name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
         one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
-    return build_structure(description, base, tool, drives, closures, home, poses, locked)
+    return build_structure(description, base, tool, drives, closures, home, poses,
+                           _below(dict(own), LOCKED))
+
+
+def _below(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the keys and values below a prefix."""
+    return {key.removeprefix(prefix): value for key, value in values.items()
+            if key.startswith(prefix)}
+
+
+def _blocks_below(values: Mapping[str, Any], prefix: str) -> dict[str, dict[str, Any]]:
+    """Return the blocks below a prefix by the names that a file gives them."""
+    blocks: dict[str, dict[str, Any]] = {}
+    for key, value in _below(values, prefix).items():
+        name, _, rest = key.partition('.')
+        blocks.setdefault(name, {})[rest] = value
+    return blocks
 
 
 def _require_motors(description: Description, values: Mapping[str, Any]) -> None:
     """Raise ModelError where joints share a transmission, and the file does not say how."""
     drives = set(values[DRIVES_KEY])
-    mapped = {key.removeprefix(MOTORS).partition('.')[2] for key in values
-              if key.startswith(MOTORS)}
+    mapped = {joint for turns in _blocks_below(values, MOTORS).values() for joint in turns}
     for each in coupled(description):
         shared = [name for name in each.joints if name in drives]
         if set(shared) - mapped:
@@ -190,7 +194,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
         if joint.armature:
             raise ModelError('robot.mjcf', name, f'have no armature ({joint.armature:g}), as a '
                              'joint without a motor: set its armature to 0')
-        given = f'friction.joints.{name}.'
+        given = f'{JOINTS}{name}.'
         if (joint.damping or joint.dry) and not any(key.startswith(given) for key in values):
             found |= {f'{given}viscous': joint.damping, f'{given}torque': joint.dry,
                       f'{given}coulomb': 0.0, f'{given}radius': 0.0}
@@ -209,9 +213,8 @@ def described_gravity(structure: Structure) -> tuple[float, ...]:
 
 def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
     """Return the radii at which loads of joints rub, where the file has them [m]."""
-    return {key.removeprefix('friction.joints.').removesuffix('.radius'): value
-            for key, value in values.items()
-            if key.startswith('friction.joints.') and key.endswith('.radius') and value}
+    return {name: block['radius'] for name, block in _blocks_below(values, JOINTS).items()
+            if block['radius']}
 
 
 def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
@@ -222,14 +225,11 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
     ModelError
         For a joint that is no drive, and a motor that moves fewer than two.
     """
-    rows: dict[str, dict[str, float]] = {}
-    for key, value in values.items():
-        if key.startswith(MOTORS):
-            motor, _, joint = key.removeprefix(MOTORS).partition('.')
+    rows = _blocks_below(values, MOTORS)
+    for motor, ratios in rows.items():
+        for joint in ratios:
             if joint not in structure.drives:
                 raise UnknownNameError('drive', joint, structure.drives, f'{MOTORS}{motor}')
-            rows.setdefault(motor, {})[joint] = value
-    for motor, ratios in rows.items():
         if sum(value != 0 for value in ratios.values()) < 2:
             raise ModelError(f'{MOTORS}{motor}', ratios, 'move two joints or more: one that moves '
                              'one has its friction in friction.viscous and friction.coulomb')
@@ -240,16 +240,11 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
 def passive_friction(structure: Structure, values: Mapping[str, Any],
                      ) -> Iterator[ModelJointFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
-    blocks: dict[str, dict[str, float]] = {}
-    for key, value in values.items():
-        if key.startswith('friction.joints.'):
-            name, _, last = key.removeprefix('friction.joints.').rpartition('.')
-            blocks.setdefault(name, {})[last] = value
+    blocks, rows = _blocks_below(values, JOINTS), friction_rows(structure)
     for name in blocks:
-        if name not in friction_rows(structure):
-            raise UnknownNameError('joint', name, friction_rows(structure),
-                                   'friction.joints')
-        joint = friction_rows(structure)[name][0]
+        if name not in rows:
+            raise UnknownNameError('joint', name, rows, 'friction.joints')
+        joint = rows[name][0]
         turns = joint < 0 or structure.tables.turns[joint]
         if turns and blocks[name]['coulomb'] and not blocks[name]['radius']:
             raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],

@@ -36,11 +36,11 @@ from pprs_dynamics.physics.three_pprs.passive_joints import (
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 
 # Tables of results, (N, 6) each: forces, of which alone there are tables for long batches; the
-# drives' motion and guide loads; of the chains cosine and sine of u, its rates, k_r and k_s,
-# reactions; and the six rows of [J].
+# drives' motion and guide loads; of the chains cosine and sine of u, its rates, k_r and k_s; and
+# the six rows of [J].
 TOTAL, RIGID, ACTIVE, PASSIVE, FORCES = 0, 1, 2, 3, 4
 POSITION, VELOCITY, ACCELERATION, GUIDE_LOAD = 4, 5, 6, 7
-ANGLE, RATE, RESISTANCE, HV, WH_STAR, VW_STAR, JACOBIAN, EVERYTHING = 8, 9, 10, 11, 12, 13, 14, 20
+ANGLE, RATE, RESISTANCE, JACOBIAN, EVERYTHING = 8, 9, 10, 11, 17
 NO_LOAD = np.zeros((1, 9))
 
 
@@ -68,7 +68,7 @@ class ForcesParameters(NamedTuple):
     drives: tuple[DriveFriction, ...]
 
 
-FRICTIONLESS = Joints(1.0, 0.0), (DriveFriction(0.0, 0.0, 1.0),) * 6
+FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES = Joints(1.0, 0.0), (DriveFriction(0.0, 0.0, 1.0),) * 6
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, parts: Any) -> Any:
@@ -98,9 +98,6 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, pa
             _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
             _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
             _write(parts, RESISTANCE, s, i, k[i].revolute, k[i].spherical)
-            _write(parts, HV, s, i, f.H, f.V)
-            _write(parts, WH_STAR, s, i, f.W, f.H_star)
-            _write(parts, VW_STAR, s, i, f.V_star, f.W_star)
             _write_twist(parts, s, i, 1.0, inverse.slides[i])
             _write_twist(parts, s, CHAINS + i, c.sin_u, inverse.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)

@@ -61,17 +61,11 @@ class Geometry:
     elbow: str = 'up'
 
     def __post_init__(self) -> None:
-        for name in ('base_radius', 'platform_radius', 'rod_length'):
-            _require(f'geometry.{name}', getattr(self, name), getattr(self, name) > 0,
-                     'be greater than 0 m')
         for name in ('chain_angles', 'platform_angles'):
             angles = np.asarray(getattr(self, name), dtype=float)
-            _require(f'geometry.{name}', getattr(self, name), angles.shape == (3,),
-                     'hold three angles [rad]')
             distance = np.abs(np.exp(1j * angles) - np.exp(1j * np.roll(angles, 1)))
             _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
                      'hold three different directions')
-        _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
         turned = np.subtract(self.platform_angles, self.chain_angles)
         span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
         _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
@@ -129,12 +123,6 @@ class Masses:
     inertia: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
-        for name, value in (('platform', self.platform), ('payload', self.payload)):
-            _require(f'masses.{name}', value, value >= 0, 'be at least 0 kg')
-        for name in ('slides', 'lifts', 'rods'):
-            value = getattr(self, name)
-            _require(f'masses.{name}', value, len(value) == 3 and min(value) >= 0,
-                     'hold three masses of at least 0 kg')
         _require('masses.platform', self.platform, self.total > 0,
                  'with masses.payload be greater than 0 kg')
         # A body's tensor has principal moments that satisfy the triangle inequality; a point

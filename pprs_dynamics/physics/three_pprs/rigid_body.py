@@ -48,7 +48,12 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
 
 
 class ChainForces(NamedTuple):
-    """Forces in one chain at one sample: see `Reactions`; of the drives, and on their guides."""
+    """Forces in one chain at one sample.
+
+    Reactions of the spherical joint on the platform: H along n_i, V along the rod from C_i to A_i,
+    W along w_i. The starred ones are the same force one joint further down, in C_i: H_star along
+    n_i, V_star vertical, W_star radial (Eq. 9). Then the drives' forces and their guides' loads.
+    """
 
     H: Value
     V: Value

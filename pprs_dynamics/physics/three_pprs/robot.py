@@ -13,39 +13,28 @@ from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
-from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.errors import (
+    ConvergenceError,
+    ModelError,
+    SingularityError,
+    WorkspaceError,
+)
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
 from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.three_pprs.closed_form import (
-    ACCELERATION,
-    ANGLE,
-    EVERYTHING,
-    FRICTIONLESS,
-    GUIDE_LOAD,
-    HV,
-    JACOBIAN,
-    NO_LOAD,
-    PASSIVE,
-    POSITION,
-    RATE,
-    RESISTANCE,
-    RIGID,
-    VW_STAR,
-    WH_STAR,
-    DriveFriction,
-    ForcesParameters,
-    forces_kernel,
-)
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
+from pprs_dynamics.physics.three_pprs import closed_form
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveFriction
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
@@ -55,7 +44,7 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.physics.three_pprs.tree import tree_structure
+from pprs_dynamics.physics.three_pprs.tree import structure_of, tree_structure
 
 RODS = 'rods'
 HOME_HEIGHT = 0.5  # [m], of the platform at home
@@ -86,22 +75,6 @@ class SingularityBounds(NamedTuple):
 UNBOUNDED = SingularityBounds()
 
 
-class Reactions(NamedTuple):
-    """Reactions of the spherical joints on the platform, and loads of the joints below.
-
-    All (N, 3) [N], chains last. H along n_i, V along the rod from C_i to A_i, W along w_i.
-    The starred ones are the same force one joint further down, in C_i: H_star along n_i,
-    V_star vertical, W_star radial (Eq. 9).
-    """
-
-    H: Array
-    V: Array
-    W: Array
-    H_star: Array
-    V_star: Array
-    W_star: Array
-
-
 class ClosedForm:
     """Kinematics, reactions and forces of a 3-PPRS at N samples, without friction of the drives.
 
@@ -118,25 +91,26 @@ class ClosedForm:
     """
 
     def __init__(self, robot: ThreePprs, motion: PlatformMotion,
-                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS[0],
+                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS_JOINTS,
                  table: Array | None = None) -> None:
         self.robot, self.motion, self.load = robot, motion, load
         self.is_regular = True
         if table is None:
-            loads = NO_LOAD
+            loads = closed_form.NO_LOAD
             if load is not None:
                 loads = np.zeros((len(motion), 9))
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
-            table = np.empty((EVERYTHING, len(motion), 6))
+            table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+            parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
             self.is_regular = evaluate(
-                forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
-                                       motion.rows, loads, table) < 0
+                closed_form.forces_kernel, parameters, motion.rows, loads, table) < 0
         self.table = table
-        self.position, self.velocity, self.acceleration = table[POSITION:ACCELERATION + 1]
-        self.efforts, self.guide_load = table[RIGID], table[GUIDE_LOAD]
-        self.cos_u, self.sin_u = np.split(table[ANGLE], 2, axis=1)
-        self.u_dot, self.u_ddot = np.split(table[RATE], 2, axis=1)
+        self.position, self.velocity, self.acceleration = (
+            table[closed_form.POSITION:closed_form.ACCELERATION + 1])
+        self.efforts, self.guide_load = table[closed_form.RIGID], table[closed_form.GUIDE_LOAD]
+        self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
+        self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
 
     @property
     def rod_angle(self) -> Array:
@@ -147,14 +121,8 @@ class ClosedForm:
     @property
     def J(self) -> Array:
         """[J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
-        J: Array = self.table[JACOBIAN:].transpose(1, 0, 2)
+        J: Array = self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
         return J
-
-    @property
-    def reactions(self) -> Reactions:
-        """Reactions of the spherical joints, and loads of the joints below."""
-        return Reactions(*(half for row in (HV, WH_STAR, VW_STAR)
-                           for half in np.split(self.table[row], 2, axis=1)))
 
     @property
     def tool_velocity(self) -> Array:
@@ -169,14 +137,14 @@ class ClosedForm:
 
     def resistances(self, joints: Joints) -> Sequence[Array]:
         """Return k_ri and k_si at the frictionless reactions, (N, 3) each, Eq. (9)."""
-        return np.split(self._with(joints).table[RESISTANCE], 2, axis=1)
+        return np.split(self._with(joints).table[closed_form.RESISTANCE], 2, axis=1)
 
     def friction(self, loads: ClosedForm, joints: Joints) -> Array:
         """Return the drive forces against friction of passive joints, (N, 6) [N].
 
         By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
         """
-        found: Array = loads._with(joints).table[PASSIVE]
+        found: Array = loads._with(joints).table[closed_form.PASSIVE]
         return found
 
     def _with(self, joints: Joints) -> ClosedForm:
@@ -341,10 +309,10 @@ class ThreePprs:
             Vector(*self.gravity)))
 
     def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
-                   ) -> KernelParameters[ForcesParameters]:
+                   ) -> KernelParameters[closed_form.ForcesParameters]:
         """Return the parameters of `forces_kernel` with friction of joints and drives."""
         return self.kernel_parameters.extended(
-            ForcesParameters, self.geometry.platform_radius, float(self.printed),
+            closed_form.ForcesParameters, self.geometry.platform_radius, float(self.printed),
             self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives)
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
@@ -357,10 +325,45 @@ class ThreePprs:
 
     # --- motion --------------------------------------------------------------------------------
 
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+    def motion_of_drives(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
                          closed: dict[Any, Array] | None = None) -> PlatformMotion:
-        """Return the platform's motion, by forward kinematics; see `solve_forward_motion`."""
-        return solve_forward_motion(self.geometry, position, velocity, acceleration, closed)
+        """Return the platform's motion that belongs to a continuous motion of the drives.
+
+        Six drive positions belong to several poses. The closures of the tree are followed from the
+        home pose, or from the last sample, and only poses are accepted whose determinant has the
+        sign that it has at home.
+
+        Parameters
+        ----------
+        position, velocity, acceleration : (N, 6) array_like
+            q [m], q_dot [m/s], q_ddot [m/s^2] in drive order.
+        closed : dict of Structure to array, optional
+            Coordinates at the last sample of another motion, from which this one goes on; brought
+            up to date.
+
+        Raises
+        ------
+        MotionError
+            For a wrong shape or a non-finite number.
+        ConvergenceError
+            Where no pose of the home pose's assembly mode is found.
+        ModelError
+            Where the geometry's home pose is itself singular.
+        """
+        q = checked_matrix('drive positions', position, COUNT)
+        structure, closed = structure_of(self.geometry), {} if closed is None else closed
+        try:
+            links = LinkMotion.of(structure, q, np.asarray(velocity), np.asarray(acceleration),
+                                  nearby=closed.get(structure))
+        except WorkspaceError as error:
+            raise ConvergenceError(
+                error.sample, f'no pose found for drive positions {q[error.sample].tolist()} m',
+                'they must close the mechanism in the assembly mode of the home pose') from None
+        m, (row, _) = links.motion, structure.links[structure.tool]
+        closed[structure] = m.q[-1].copy()
+        return PlatformMotion(m.p[:, row], _orientation(*(m.q[:, structure.coordinates.index(
+            f'platform.{angle}')] for angle in ('yaw', 'pitch', 'roll'))),
+            m.u[:, row], m.w[:, row], m.ud[:, row], m.wd[:, row])
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
@@ -441,3 +444,11 @@ class ThreePprs:
         """Raise ModelError, of a key and its value, for bodies that cannot be."""
         if not self.masses.total > 0 or min(self.masses.rods) < 0:
             raise ModelError(key, value, 'leave masses greater than 0')
+
+
+def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:
+    """Return the quaternions x, y, z, w of turns about z, then the new y, then the new x."""
+    (z, y, x), (c_z, c_y, c_x) = ([turn(angle / 2) for angle in (yaw, pitch, roll)]
+                                  for turn in (np.sin, np.cos))
+    return np.column_stack((x * c_y * c_z - c_x * y * z, c_x * y * c_z + x * c_y * z,
+                            c_x * c_y * z - x * y * c_z, c_x * c_y * c_z + x * y * z))

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 from trajectory_msgs.msg import (
     JointTrajectory,
     MultiDOFJointTrajectory,
-    MultiDOFJointTrajectoryPoint,
 )
 
 from pprs_dynamics.arrays import Array
@@ -23,7 +23,6 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import (
-    BASE,
     NANOSECONDS,
     PLATFORM,
     RobotNames,
@@ -35,7 +34,6 @@ from pprs_dynamics.ros.messages.trajectory_bytes import PointLayout, Points
 
 TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
 REJECT, SPLINE = 'reject', 'spline'
-VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
 Motion = PlatformMotion | JointMotion
 
 
@@ -125,196 +123,29 @@ class Timing(NamedTuple):
                             f'executed at once; max_ahead allows {self.max_ahead:g} s')
 
 
-def read_trajectory(
-    message: MultiDOFJointTrajectory, now: int, missing: str = REJECT, frame: str = BASE,
-    body: str = PLATFORM,
-) -> TrajectoryRequest:
-    """Return the platform motion that a message asks for.
-
-    Parameters
-    ----------
-    message : trajectory_msgs/MultiDOFJointTrajectory
-    now : int
-        Time of arrival [ns], which a stamp of 0 means.
-    missing : {'reject', 'spline'}
-        What to do where points have no velocities or no accelerations: 'spline' takes those
-        that are missing from a spline through the poses.
-    frame : str
-        In which poses must be given.
-    body : str
-        Whose they must be.
-
-    Raises
-    ------
-    Rejection, MotionError
-        For a message that breaks a rule.
-    """
-    points = message.points
-    if not points:
-        raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
-    if list(message.joint_names) != [body]:
-        raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
-                        f'must be [{body!r}]')
-    if message.header.frame_id not in ('', frame):
-        raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
-                        f'must be {frame!r} or empty')
-    lacking = _check_counts(points, missing)
-    start, offsets = _times_of(message, now)
-    numbers = np.array([_row(point) for point in points])
-    if lacking.any():
-        _fill_in(numbers, (VELOCITY, ACCELERATION), spline_derivatives(
-            (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7]), lacking)
-    return _request_of(start, offsets, _motion_of(numbers))
-
-
-def _motion_of(numbers: Array) -> Callable[[Array], Motion]:
-    return lambda time: PlatformMotion.from_rows(numbers, time)
-
-
-def _request_of(
-    start: int, offsets: Indices, motion_at: Callable[[Array], Motion],
-) -> TrajectoryRequest:
-    """Return the request for a motion that is made with its times [s], from the start on."""
-    if offsets[0] < 0:
-        raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
-                        'must not be negative')
-    return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
-
-
-def _times_of(message: Any, now: int) -> tuple[int, Indices]:
-    """Return the start of a trajectory, and time_from_start of its points (N,) [ns]."""
-    return nanoseconds(message.header.stamp) or now, np.array(
-        [nanoseconds(point.time_from_start) for point in message.points], dtype=np.int64)
-
-
-def _check_counts(
-    points: Sequence[Any], missing: str, places: str = 'transforms', wanted: int = 1,
-) -> Mask:
-    """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
-
-    Parameters
-    ----------
-    points : sequence of messages
-    missing : {'reject', 'spline'}
-    places : str
-        Field that says where.
-    wanted : int
-        Elements that each field must have.
-
-    Raises
-    ------
-    Rejection
-        SIZE, for another number of elements.
-    """
-    lacking = np.zeros((len(points), 2), dtype=bool)
-    for index, point in enumerate(points):
-        for column, field in enumerate(('velocities', 'accelerations', places)):
-            count = len(getattr(point, field))
-            if count == wanted:
-                continue
-            may_lack = count == 0 and field != places and missing == SPLINE
-            if may_lack and len(points) >= FEWEST_POSES:
-                lacking[index, column] = True
-                continue
-            hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
-                    f'{len(points)}' if may_lack else '')
-            raise Rejection(
-                'SIZE', f'point {index} has {count} {field}, must have {wanted}{hint}')
-    return lacking
-
-
-def _fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
-             lacking: Mask) -> None:
-    """Put the derivatives of a spline into the columns of those points that lack their own."""
-    for place, values, rows in zip(places, derivatives, lacking.T, strict=True):
-        if not np.isfinite(values).all():
-            raise Rejection('OUTPUT', 'the spline through the points has derivatives that are '
-                            'not finite')
-        numbers[rows, place] = values[rows]
-
-
-def _row(point: MultiDOFJointTrajectoryPoint) -> tuple[float, ...]:
-    """Return the numbers of a point, zero where it has none."""
-    pose = point.transforms[0]
-    p, q = pose.translation, pose.rotation
-    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w,
-            *_twist(point.velocities), *_twist(point.accelerations))
-
-
-def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
-    if not twists:
-        return (0.0,) * 6
-    linear, angular = twists[0].linear, twists[0].angular
-    return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
-
-
-def read_joint_trajectory(
-    message: JointTrajectory, joints: Sequence[str], now: int, missing: str = REJECT,
-) -> TrajectoryRequest:
-    """Return the motion that a message asks of an arm.
-
-    Parameters
-    ----------
-    message : trajectory_msgs/JointTrajectory
-        Of all joints, in any order; its efforts are not read, and its frame means nothing.
-    joints : sequence of n str
-        In the model's order.
-    now, missing
-        See `read_trajectory`; a spline goes through the positions.
-
-    Raises
-    ------
-    Rejection, MotionError
-        For a message that breaks a rule.
-    """
-    points, names = message.points, list(message.joint_names)
-    if not points:
-        raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
-    if sorted(names) != sorted(joints):
-        raise Rejection('NAMES', f'joint_names is {names!r:.200}, must hold each of '
-                        f'{", ".join(joints)} once, and nothing else')
-    count = len(joints)
-    lacking = _check_counts(points, missing, 'positions', count)
-    start, offsets = _times_of(message, now)
-    none = np.zeros(count)
-    order = [names.index(joint) for joint in joints]
-    numbers = np.array([[point.positions, point.velocities or none, point.accelerations or none]
-                        for point in points], dtype=float)[:, :, order].reshape(len(points), -1)
-    if lacking.any():
-        _fill_in(numbers, (slice(count, 2 * count), slice(2 * count, 3 * count)),
-                 position_spline_derivatives((offsets - offsets[0]) / NANOSECONDS,
-                                             numbers[:, :count]), lacking)
-    return _request_of(start, offsets, _joint_motion_of(count, numbers))
-
-
-class RequestReader(NamedTuple):
-    """How requests arrive, as bytes.
+class RequestReader:
+    """Reads requests for the motion of one body, or of joints.
 
     Parameters
     ----------
     message : type
-    layout : PointLayout
-        Of messages that are read without objects.
-    of_points : callable
-        Points, time of arrival [ns] -> TrajectoryRequest, or None for other names or frames.
-    of_message : callable
-        Message, time of arrival [ns] and what to do about missing derivatives -> TrajectoryRequest;
-        see `read_trajectory`.
+        MultiDOFJointTrajectory for a body, JointTrajectory for joints.
+    names : tuple of str
+        The body, or the joints in the model's order; messages may have another order.
+    frame : str, optional
+        In which poses must be given; None: any.
     """
 
-    message: type
-    layout: PointLayout
-    of_points: Callable[[Points, int], TrajectoryRequest | None]
-    of_message: Callable[..., TrajectoryRequest]
+    def __init__(self, message: type, names: Sequence[str], frame: str | None = None) -> None:
+        self.message, self._names, self._frame = message, list(names), frame
+        self._is_body, count = message is MultiDOFJointTrajectory, len(names)
+        # Numbers of place, velocity and acceleration of a point.
+        self._widths = (7, 6, 6) if self._is_body else (count,) * 3
+        # Joints come without efforts: an empty sequence follows.
+        self.layout = PointLayout((count,) * 3, self._widths, empty=0 if self._is_body else 1)
 
     def read(self, data: bytes, now: int, missing: str = REJECT) -> TrajectoryRequest:
-        """Return the request in the bytes of a message.
-
-        Parameters
-        ----------
-        data : bytes
-        now, missing
-            See `read_trajectory`.
+        """Return the request in the bytes of a message; see `of_message`.
 
         Raises
         ------
@@ -322,8 +153,118 @@ class RequestReader(NamedTuple):
             For a message that breaks a rule.
         """
         points = self.layout.read(data)
-        request = None if points is None else self.of_points(points, now)
-        return request or self.of_message(message_in(data, self.message), now, missing)
+        if points is None:  # another layout
+            return self.of_message(message_in(data, self.message), now, missing)
+        self._check_names(points.names, points.frame)
+        return self._request(points, now)
+
+    def of_message(self, message: Any, now: int, missing: str = REJECT) -> TrajectoryRequest:
+        """Return the request in a message.
+
+        Parameters
+        ----------
+        message : MultiDOFJointTrajectory or JointTrajectory
+            Efforts are not read.
+        now : int
+            Time of arrival [ns], which a stamp of 0 means.
+        missing : {'reject', 'spline'}
+            What to do where points have no velocities or no accelerations: 'spline' takes those
+            that are missing from a spline through the places.
+
+        Raises
+        ------
+        Rejection, MotionError
+            For a message that breaks a rule.
+        """
+        points, names, frame = message.points, list(message.joint_names), message.header.frame_id
+        if not points:
+            raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
+        self._check_names(names, frame)
+        lacking = self._lacking(points, missing)
+        offsets = np.array([nanoseconds(point.time_from_start) for point in points], np.int64)
+        numbers = np.array([self._row(point) for point in points], dtype=float)
+        if lacking.any():
+            self._fill_in(numbers, (offsets - offsets[0]) / NANOSECONDS, lacking)
+        return self._request(
+            Points(nanoseconds(message.header.stamp), frame, names, numbers, offsets), now)
+
+    def _check_names(self, names: list[str], frame: str) -> None:
+        if sorted(names) != sorted(self._names):
+            raise Rejection('NAMES', f'joint_names is {names!r:.200}, must hold each of '
+                            f'{", ".join(self._names)} once, and nothing else')
+        if self._frame is not None and frame not in ('', self._frame):
+            raise Rejection('FRAME', f'header.frame_id is {frame!r:.100}, '
+                            f'must be {self._frame!r} or empty')
+
+    def _lacking(self, points: Sequence[Any], missing: str) -> Mask:
+        """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
+
+        Raises
+        ------
+        Rejection
+            SIZE, for another number of elements.
+        """
+        place, wanted = 'transforms' if self._is_body else 'positions', len(self._names)
+        lacking = np.zeros((len(points), 2), dtype=bool)
+        for index, point in enumerate(points):
+            for column, field in enumerate(('velocities', 'accelerations', place)):
+                count = len(getattr(point, field))
+                if count == wanted:
+                    continue
+                may_lack = count == 0 and field != place and missing == SPLINE
+                if may_lack and len(points) >= FEWEST_POSES:
+                    lacking[index, column] = True
+                    continue
+                hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
+                        f'{len(points)}' if may_lack else '')
+                raise Rejection(
+                    'SIZE', f'point {index} has {count} {field}, must have {wanted}{hint}')
+        return lacking
+
+    def _row(self, point: Any) -> list[float]:
+        """Return the numbers of a point, zero where it has none."""
+        if not self._is_body:
+            none = [0.0] * len(self._names)
+            return [*point.positions, *(point.velocities or none), *(point.accelerations or none)]
+        pose = point.transforms[0]
+        p, q = pose.translation, pose.rotation
+        return [p.x, p.y, p.z, q.x, q.y, q.z, q.w,
+                *_twist(point.velocities), *_twist(point.accelerations)]
+
+    def _fill_in(self, numbers: Array, time: Array, lacking: Mask) -> None:
+        """Put the derivatives of a spline into the columns of those points that lack their own."""
+        place, velocity, acceleration = self._parts(numbers)
+        derivatives = (spline_derivatives(time, place[:, :3], place[:, 3:]) if self._is_body
+                       else position_spline_derivatives(time, place))
+        for given, values, rows in zip((velocity, acceleration), derivatives, lacking.T,
+                                       strict=True):
+            if not np.isfinite(values).all():
+                raise Rejection('OUTPUT', 'the spline through the points has derivatives that are '
+                                'not finite')
+            given[rows] = values[rows]
+
+    def _parts(self, numbers: Array) -> tuple[Array, Array, Array]:
+        """Return places, velocities and accelerations, as views."""
+        first, second = self._widths[0], self._widths[0] + self._widths[1]
+        return numbers[:, :first], numbers[:, first:second], numbers[:, second:]
+
+    def _request(self, points: Points, now: int) -> TrajectoryRequest:
+        numbers, offsets = points.numbers, points.offsets
+        if offsets[0] < 0:
+            raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s,'
+                            ' must not be negative')
+        motion: Motion
+        if self._is_body:
+            motion = PlatformMotion.from_rows(numbers, offsets / NANOSECONDS)
+        else:
+            position, velocity, acceleration = self._parts(numbers)
+            if points.names != self._names:
+                order = [points.names.index(joint) for joint in self._names]
+                position, velocity, acceleration = (
+                    each[:, order] for each in (position, velocity, acceleration))
+            motion = JointMotion.checked(position, velocity, acceleration, offsets / NANOSECONDS,
+                                         len(self._names))
+        return TrajectoryRequest(motion, points.stamp or now, offsets)
 
 
 def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
@@ -332,53 +273,19 @@ def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str,
     A robot with loops takes the motion of its drives, and of its tool if the pose of the tool
     determines the drives.
     """
-    readers = {TRAJECTORY: reader_for(model, names)}
-    if model.moves_joints:
-        try:
-            tool = model.robot.tool_pose.structure.tool
-        except ModelError:
-            return readers
-        readers[POSES] = _poses((names and names.frame) or str(model.values['robot.base']),
-                                tool)
+    own = names or RobotNames.of(model)
+    if not model.moves_joints:
+        return {TRAJECTORY: RequestReader(MultiDOFJointTrajectory, [PLATFORM], own.frame)}
+    readers = {TRAJECTORY: RequestReader(JointTrajectory, own.joints)}
+    with suppress(ModelError):
+        tool = model.robot.tool_pose.structure.tool
+        readers[POSES] = RequestReader(MultiDOFJointTrajectory, [tool],
+                                       own.frame or str(model.values['robot.base']))
     return readers
 
 
-def reader_for(model: DriveModel, names: RobotNames | None = None) -> RequestReader:
-    """Return how trajectories for a model arrive, by the names of its robot."""
-    names = names or RobotNames.of(model)
-    return joint_reader(names.joints) if model.moves_joints else _poses(names.frame, PLATFORM)
-
-
-def _poses(frame: str, body: str) -> RequestReader:
-    def of_points(points: Points, now: int) -> TrajectoryRequest | None:
-        if points.frame not in ('', frame) or points.names != [body]:
-            return None
-        return _request_of(points.stamp or now, points.offsets, _motion_of(points.numbers))
-
-    return RequestReader(
-        MultiDOFJointTrajectory, PointLayout((1, 1, 1), (7, 6, 6)), of_points,
-        lambda message, now, missing: read_trajectory(message, now, missing, frame, body))
-
-
-def joint_reader(joints: Sequence[str]) -> RequestReader:
-    """Return how joint trajectories arrive, for joints in the model's order."""
-    joints, count = list(joints), len(joints)
-
-    def of_points(points: Points, now: int) -> TrajectoryRequest | None:
-        if sorted(points.names) != sorted(joints):
-            return None
-        numbers = points.numbers
-        if points.names != joints:
-            order = np.array([points.names.index(joint) for joint in joints])
-            numbers = numbers[:, np.concatenate([order + k * count for k in range(3)])]
-        return _request_of(points.stamp or now, points.offsets, _joint_motion_of(count, numbers))
-
-    return RequestReader(
-        JointTrajectory, PointLayout((count,) * 3, (count,) * 3, empty=1),  # without efforts
-        of_points, lambda message, now, missing: read_joint_trajectory(
-            message, joints, now, missing))
-
-
-def _joint_motion_of(count: int, numbers: Array) -> Callable[[Array], Motion]:
-    position, velocity, acceleration = (numbers[:, k * count:(k + 1) * count] for k in range(3))
-    return lambda time: JointMotion.checked(position, velocity, acceleration, time, count)
+def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
+    if not twists:
+        return (0.0,) * 6
+    linear, angular = twists[0].linear, twists[0].angular
+    return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z

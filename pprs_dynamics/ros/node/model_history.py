@@ -39,7 +39,7 @@ class ModelHistory:
         """
         if not self._is_restoring:
             self._before = [*self._before, [
-                Parameter(each.name, each.type_, before[each.name])
+                Parameter(each.name, value=before[each.name])
                 for each in changed if each.name in before]][-MOST_CHANGES:]
 
     def _restore(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

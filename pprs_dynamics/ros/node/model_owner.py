@@ -120,7 +120,5 @@ class ModelOwner:
 
 def changes(model: DriveModel, values: Values) -> list[Parameter]:
     """Return the parameters that make a model another one, without its ledger."""
-    changed = {key: value for key, value in values.items()
-               if not key.startswith(HISTORY) and model.values.get(key) != value}
-    return [Parameter(name, Parameter.Type.STRING_ARRAY, list(value)) if name == ACTIVE
-            else Parameter(name, value=value) for name, value in changed.items()]
+    return [Parameter(key, value=value) for key, value in values.items()
+            if not key.startswith(HISTORY) and model.values.get(key) != value]

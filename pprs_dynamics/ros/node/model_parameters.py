@@ -5,9 +5,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -18,24 +17,20 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
     KEYS,
-    NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
 )
 from pprs_dynamics.ros.node.model_history import ModelHistory
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
-    added_descriptor,
     current_values,
     declare_model,
     declare_node_parameters,
     has_model,
-    in_declared_type,
     node_parameter,
     overrides,
     with_hint,
 )
-from pprs_dynamics.ros.node.provenance import arguments_of
 
 Checked = TypeVar('Checked')
 DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
@@ -57,81 +52,45 @@ class NoModelError(PprsError):
             'which is connected; -p demo:=true takes the paper\'s robot, for demonstrations')
 
 
-class ExplainsRefusals(Node):
-    """A node that refuses parameters in the words of the model's files.
-
-    rclpy compares with the range in a descriptor first, and says less. `_settings` checks here.
-
-    Attributes
-    ----------
-    arguments : sequence of str
-        Command line of the node.
-    """
-
-    def __init__(self, name: str, **options: Any) -> None:
-        self.arguments = arguments_of(options)
-        super().__init__(name, **options)
-
-    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one after the other; each is taken or refused by itself."""
-        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
-
-    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set all parameters or none."""
-        settings: Followed[Any] | None = getattr(self, '_settings', None)
-        if settings is not None:  # else they are being declared
-            parameter_list = [in_declared_type(self, each) for each in parameter_list]
-            result = settings.check(parameter_list)
-            if not result.successful:
-                return result
-        return super().set_parameters_atomically(parameter_list)
-
-
-class Followed(ABC, Generic[Checked]):
-    """Parameters of a running node: what they mean is checked before they change, and then applied.
+def follow(node: Node, validate: Callable[[list[Parameter]], Checked],
+           apply: Callable[[Checked, list[Parameter]], None]) -> Checked:
+    """Check changes of a running node's parameters, bring them into force, and return the first.
 
     Parameters
     ----------
     node : Node
-    declared : iterable of NodeParameter
-        The node's own parameters, declared already.
+    validate : callable
+        Returns what the parameters mean with some of them changed, or raises PprsError.
+    apply : callable
+        Called with what was checked, and nothing else, once the parameters have changed.
     """
+    checked = [validate([])]
 
-    def __init__(self, node: Node, declared: Iterable[NodeParameter]) -> None:
-        self._node, self._declared = node, tuple(declared)
-        self._checked = self._validated(())
-        node.add_on_set_parameters_callback(self.check)
-        node.add_post_set_parameters_callback(self._after_change)
-
-    @abstractmethod
-    def _validated(self, changes: Iterable[Parameter]) -> Checked:
-        """Return what the parameters mean with some of them changed, or raise PprsError."""
-
-    @abstractmethod
-    def _apply(self, checked: Checked, changes: Iterable[Parameter]) -> None:
-        """Bring into force what was checked."""
-
-    def check(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether the parameters would be valid with some of them changed, and why not."""
+    def check(changes: list[Parameter]) -> SetParametersResult:
         if not are_of_topics(changes):
             try:
-                self._checked = self._validated(changes)
+                checked[0] = validate(changes)
             except PprsError as error:
                 return SetParametersResult(successful=False, reason=with_hint(error))
         return SetParametersResult(successful=True)
 
-    def _after_change(self, changes: list[Parameter]) -> None:
-        # What was checked, and nothing else, comes into force.
+    def changed(changes: list[Parameter]) -> None:
         if not are_of_topics(changes):
-            self._apply(self._checked, changes)
+            apply(checked[0], changes)
+
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(changed)
+    return checked[0]
 
 
-class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
+class ModelParameters:
     """Declares a node's own parameters and those of a model, and follows their changes.
 
     Parameters
     ----------
     node : Node
+    arguments : sequence of str
+        Its command line.
     parameters : iterable of NodeParameter
         The node's own, which are declared before the model's.
     changed : callable
@@ -158,17 +117,17 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
     """
 
     def __init__(
-        self, node: ExplainsRefusals, parameters: Iterable[NodeParameter],
+        self, node: Node, arguments: Sequence[str], parameters: Iterable[NodeParameter],
         changed: Callable[[], None], drives: bool = False,
     ) -> None:
         self._changed, self.history = changed, ModelHistory(node) if drives else None
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
-        taken_from_paper = declare_model(node, node.arguments)
+        taken_from_paper = declare_model(node, arguments)
         self._stays: dict[str, Any] = {}
-        super().__init__(node, parameters)
-        self.model, self.node_values = self._checked
+        self._node, self._declared = node, parameters
+        self.model, self.node_values = follow(node, self._validated, self._apply)
         # Whatever is connected would be driven by the forces of another robot.
         if not self.node_values[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())
@@ -221,15 +180,7 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
         before, (self.model, self.node_values) = self.model, checked
         if self.history is not None and self.model.fingerprint != before.fingerprint:
             self.history.note(before.values, changes)
-        for change in changes:
-            if change.name not in NAMES and change.name.startswith('effects.') and (
-                    self._node.has_parameter(change.name)):
-                self._describe(change.name)
         self._changed()
-
-    def _describe(self, name: str) -> None:
-        if not self._node.describe_parameter(name).description:
-            self._node.set_descriptor(name, added_descriptor(name))
 
 
 def are_of_topics(changes: list[Parameter]) -> bool:

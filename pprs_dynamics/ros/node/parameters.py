@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -19,12 +18,10 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import (
-    ADDED,
     ANY,
     DRIVES_KEY,
     FILES,
     KEYS,
-    LARGEST,
     Key,
     as_list,
     is_described,
@@ -38,8 +35,6 @@ from pprs_dynamics.system.package_files import located
 
 ACTIVE = 'effects.active'
 HISTORY = 'history.'
-LISTS = (Parameter.Type.DOUBLE_ARRAY, Parameter.Type.STRING_ARRAY)
-LARGEST_INTEGER = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -112,7 +107,7 @@ def node_parameter(
         is_text=is_text, may_be_empty=is_text or is_list, default=default, **more)
 
 
-def declare_node_parameters(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
+def declare_node_parameters(node: Node, parameters: Sequence[NodeParameter]) -> dict[str, Any]:
     """Declare parameters of the node's own and return their checked values.
 
     Raises
@@ -120,11 +115,10 @@ def declare_node_parameters(node: Node, parameters: Iterable[NodeParameter]) -> 
     ModelError
         For a value that breaks its rule.
     """
-    values, given = {}, overrides(node)
-    for parameter in parameters:
-        value = parameter.check(given.get(parameter.name, parameter.default))
-        _declare_key(node, parameter, value)
-        values[parameter.name] = value
+    given = overrides(node)
+    values = {each.name: each.check(given.get(each.name, each.default)) for each in parameters}
+    for each in parameters:
+        _declare(node, each, values[each.name])
     return values
 
 
@@ -159,88 +153,45 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
     given = overrides(node)
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(located(given[key], folder_of(key, arguments)))
+            given[key] = str(located(given[key], folder_of(given[key], arguments)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
-    _declare_keys(node, keys_of(given), given, defaults)
+    for name, entry in keys_of(given).items():
+        value = given.get(name, defaults.get(name, entry.default))
+        if value is None and name not in given:
+            raise ModelError(name, MISSING, entry.rule)
+        _declare(node, entry, entry.check(
+            () if value is None and entry.may_be_empty else value))
+    added = {name: value for name, value in given.items() if value is not None}
+    for name, value in {ACTIVE: [], **added}.items():
+        # The ledger is for `pprs history`: a page of numbers that no node reads.
+        if not node.has_parameter(name) and not name.startswith(HISTORY):
+            node.declare_parameter(name, value, _added_descriptor(name), ignore_override=True)
     return [name for name in KEYS if name not in given and name in defaults]
 
 
-def _declare_keys(
-    node: Node, keys: Mapping[str, Key], given: Mapping[str, Any], defaults: Mapping[str, Any],
-) -> None:
-    """Declare a model's keys and further parameters, as of effects."""
-    for name, key in keys.items():
-        value = given.get(name, defaults.get(name, key.default))
-        if value is None and name in given and key.may_be_empty:
-            value = ()
-        elif value is None and name not in given:
-            raise ModelError(name, MISSING, key.rule)
-        _declare_key(node, key, key.check(value))
-    for name, value in {ACTIVE: [], **given}.items():
-        # The ledger is for `pprs history`: a page of numbers that no node reads.
-        if not node.has_parameter(name) and not name.startswith(HISTORY):
-            kind = _added_type(name, value)
-            if kind != Parameter.Type.NOT_SET:
-                _declare(node, name, kind, _decimal(kind, value), added_descriptor(name))
+def _declare(node: Node, key: Key, value: Any) -> None:
+    """Declare a key with a checked value.
+
+    Its type and range are checked by the rules of model files, which explain a refusal. rclpy's own
+    check would refuse a whole number, and an empty list, which has no type.
+    """
+    unit = f' [{key.unit}]' if key.unit else ''
+    node.declare_parameter(key.name, as_list(value), ParameterDescriptor(
+        description=f'{key.description}{unit}', additional_constraints=f'must {key.rule}',
+        # An override would bring back a whole number, or a relative path.
+        dynamic_typing=True), ignore_override=True)
 
 
-def _declare_key(node: Node, key: Key, value: Any) -> None:
-    unit, kind = f' [{key.unit}]' if key.unit else '', _type_of(key)
-    _declare(node, key.name, kind, as_list(value), _descriptor(
-        f'{key.description}{unit}', key.rule, kind,
-        max(key.lower, 0.0) if key.positive else key.lower, key.upper))
-
-
-def _declare(
-    node: Node, name: str, kind: Parameter.Type, value: Any, descriptor: ParameterDescriptor,
-) -> None:
-    """Declare a parameter with a value and its type, which an empty list lacks."""
-    # An override would bring back a whole number, or a relative path.
-    if isinstance(value, list) and not value:
-        node.declare_parameter(name, kind, descriptor, ignore_override=True)
-        node.set_parameters([Parameter(name, kind, value)])
-    else:
-        node.declare_parameter(name, value, descriptor, ignore_override=True)
-
-
-def in_declared_type(node: Node, change: Parameter) -> Parameter:
-    """Return a change with whole numbers and empty lists in the declared type."""
-    kind = (node.get_parameter(change.name).type_ if node.has_parameter(change.name)
-            else _added_type(change.name, change.value))
-    value = plain_value(change.value)
-    decimal = _decimal(kind, value)
-    return change if decimal is value and value != [] else Parameter(change.name, kind, decimal)
-
-
-def _decimal(kind: Parameter.Type, value: Any) -> Any:
-    if kind == Parameter.Type.DOUBLE and type(value) is int:
-        return float(value)
-    if kind in LISTS and (value is None or value == []):
-        return []
-    if kind == Parameter.Type.DOUBLE_ARRAY and isinstance(value, list) and all(
-            type(element) is int for element in value):
-        return [float(element) for element in value]
-    return value
-
-
-def _added_type(name: str, value: Any) -> Parameter.Type:
-    """Return the type of a parameter that is not in the table of keys: numbers are decimal."""
-    if name == ACTIVE:
-        return Parameter.Type.STRING_ARRAY
-    kind = Parameter.Type.from_parameter_value(value)
-    if name.startswith(ADDED):
-        kind = {Parameter.Type.INTEGER: Parameter.Type.DOUBLE,
-                Parameter.Type.INTEGER_ARRAY: Parameter.Type.DOUBLE_ARRAY}.get(kind, kind)
-    return kind
-
-
-def _type_of(key: Key) -> Parameter.Type:
-    if key.size is not None:
-        return Parameter.Type.DOUBLE_ARRAY if key.is_number else Parameter.Type.STRING_ARRAY
-    if isinstance(key.default, int):  # or bool
-        return Parameter.Type.from_parameter_value(key.default)
-    return Parameter.Type.DOUBLE if key.is_number else Parameter.Type.STRING
+def _added_descriptor(name: str) -> ParameterDescriptor:
+    """Return the description of a parameter of an effect, which no table of keys has."""
+    block, _, rest = name.partition('.')
+    effect, _, place = rest.partition('.')
+    for parameter in CATALOGUE[effect].parameters if effect in CATALOGUE else ():
+        if block == 'effects' and place.rpartition('.')[2] == parameter.name:
+            return ParameterDescriptor(
+                description=f'{effect}: {parameter.description}', dynamic_typing=True)
+    return ParameterDescriptor(dynamic_typing=True)
 
 
 def refuse_unknown(node: Node) -> None:
@@ -261,44 +212,6 @@ def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, A
     merged = {**node.get_parameters_by_prefix(''), **{change.name: change for change in changes}}
     return {name: plain_value(parameter.value) for name, parameter in merged.items()
             if parameter.type_ != Parameter.Type.NOT_SET}
-
-
-def added_descriptor(name: str) -> ParameterDescriptor:
-    """Return how a parameter is declared that is not in the table of keys, as of an effect."""
-    if name == ACTIVE:
-        return _descriptor('effects in force in addition to the paper\'s friction',
-                           'be a list of names of effects', Parameter.Type.STRING_ARRAY)
-    block, _, rest = name.partition('.')
-    effect, _, place = rest.partition('.')
-    if block == 'effects' and effect in CATALOGUE:
-        for parameter in (parameter.widest for parameter in CATALOGUE[effect].parameters):
-            if place.rpartition('.')[2] == parameter.name:
-                unit = f' [{parameter.unit}]' if parameter.unit else ''
-                descriptor = _descriptor(
-                    f'{effect}: {parameter.description}{unit}',
-                    f'lie in [{parameter.lower:g}, {parameter.upper:g}]{unit}',
-                    Parameter.Type.DOUBLE, parameter.lower, parameter.upper)
-                descriptor.dynamic_typing = True  # it may be taken away again
-                return descriptor
-    return ParameterDescriptor(dynamic_typing=True)
-
-
-def _descriptor(
-    description: str, rule: str, kind: Parameter.Type, lower: float = -math.inf,
-    upper: float = math.inf,
-) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor(
-        description=description, additional_constraints=f'must {rule}')
-    if math.isfinite(lower) or math.isfinite(upper):
-        if kind == Parameter.Type.DOUBLE:
-            descriptor.floating_point_range = [FloatingPointRange(
-                # Message fields of that type turn whole numbers into nonsense without a word.
-                from_value=float(max(lower, -LARGEST)), to_value=float(min(upper, LARGEST)))]
-        elif kind == Parameter.Type.INTEGER:
-            descriptor.integer_range = [IntegerRange(
-                from_value=round(max(lower, -LARGEST_INTEGER)),
-                to_value=round(min(upper, LARGEST_INTEGER)), step=0)]
-    return descriptor
 
 
 def with_hint(error: Exception) -> str:

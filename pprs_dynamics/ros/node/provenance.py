@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
-from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, LEDGER, find_file
-from pprs_dynamics.system.bounded_yaml import parse, read_text
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.system.plain_text import displayed
 
 OPTION = '--params-file'
-BLOCK = 'ros__parameters.'
 
 
 def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
@@ -49,26 +47,10 @@ def arguments_of(options: Mapping[str, Any]) -> Sequence[str]:
     return options.get('cli_args') or sys.argv
 
 
-def folder_of(name: str, arguments: Sequence[str]) -> Path:
-    """Return the folder that a path in a parameter counts from: its file's, or the present one."""
-    files = [path for path in _paths(arguments) if path.is_file() and name in _names_in(path)]
-    return Path.cwd() if not files or name in _names_on(arguments) else (
-        files[-1].resolve().parent)
+def folder_of(file: str, arguments: Sequence[str]) -> Path:
+    """Return the folder that a relative path in a parameter counts from.
 
-
-def _names_in(path: Path) -> list[str]:
-    return [name.partition(BLOCK)[2] for name in _flat(parse(read_text(path), path))
-            if BLOCK in name and not name.startswith(LEDGER)]
-
-
-def _names_on(arguments: Sequence[str]) -> list[str]:
-    return [value.partition(':=')[0].rpartition(':')[2]
-            for option, value in pairwise(arguments) if option in ('-p', '--param')]
-
-
-def _flat(tree: Mapping[str, Any]) -> Iterator[str]:
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from (f'{name}.{rest}' for rest in _flat(value))
-        else:
-            yield str(name)
+    That of the last parameter file beside which it exists, else the present one.
+    """
+    folders = [path.resolve().parent for path in reversed(_paths(arguments))]
+    return next((folder for folder in folders if (folder / file).exists()), Path.cwd())

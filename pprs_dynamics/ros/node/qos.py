@@ -9,7 +9,6 @@ import copy
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
@@ -38,15 +37,16 @@ POLICIES = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILIT
 def publisher(node: Node, kind: type, topic: str, profile: QoSProfile = EVERY_MESSAGE) -> Any:
     """Create a publisher whose QoS the parameters qos_overrides.<topic>.publisher.* change.
 
+    rclpy warns of listeners that ask for another QoS, with the name of the topic as given here.
+
     Raises
     ------
     ModelError
         For an override that is none.
     """
-    warn = PublisherEventCallbacks(incompatible_qos=_warning(node, topic, 'a listener asks for'))
     return _overridable(node, topic, lambda options: node.create_publisher(
         # rclpy writes the overrides into the profile.
-        kind, topic, copy.copy(profile), qos_overriding_options=options, event_callbacks=warn))
+        kind, node.resolve_topic_name(topic), copy.copy(profile), qos_overriding_options=options))
 
 
 def subscription(
@@ -54,24 +54,9 @@ def subscription(
     profile: QoSProfile = EVERY_MESSAGE,
 ) -> Any:
     """Create a subscription whose QoS qos_overrides.<topic>.subscription.* change."""
-    warn = SubscriptionEventCallbacks(
-        incompatible_qos=_warning(node, topic, 'a publisher offers'))
     return _overridable(node, topic, lambda options: node.create_subscription(
-        kind, topic, callback, copy.copy(profile), qos_overriding_options=options, raw=raw,
-        event_callbacks=warn))
-
-
-def _warning(node: Node, topic: str, who: str) -> Callable[[Any], None]:
-    """Return a callback that warns of QoS that does not fit, with the topic after remapping."""
-    resolved = node.resolve_topic_name(topic)
-
-    def warn(event: Any) -> None:
-        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
-        node.get_logger().warning(
-            f'{resolved}: {who} another {policy}, so that no messages pass between the two; '
-            f'qos_overrides.{resolved}.* change it here')
-
-    return warn
+        kind, node.resolve_topic_name(topic), callback, copy.copy(profile),
+        qos_overriding_options=options, raw=raw))
 
 
 def _overridable(node: Node, topic: str, create: Callable[[QoSOverridingOptions], Any]) -> Any:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import asdict
@@ -44,7 +43,6 @@ from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
-from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
@@ -139,7 +137,7 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'ledger.json': self.ledger, 'session.json': self.session,
+        return {'model.yaml': self.model, 'session.json': self.session,
                 'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
                 **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
@@ -224,13 +222,6 @@ class Api:
         session, with_ticked = self.hub.the_session, query.get('ticked') == '1'
         return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
                               lambda path: session.export(path, with_ticked))
-
-    def ledger(self, query: Any) -> Response:
-        """Answer the ledger alone."""
-        steps = [step.to_dict() for step in read_steps(
-            self.hub.the_session.ticks.model.values)]
-        return attached('ledger.json', 'application/json',
-                        json.dumps({'steps': steps}, indent=2).encode())
 
     def session(self, query: Any) -> Response:
         """Answer what `pprs workbench` goes on with."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory, mkdtemp
 from threading import Event, Lock, Thread
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.fleet.recordings import ENDINGS
@@ -24,35 +24,15 @@ from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.drive_model import DriveModel
+
+if TYPE_CHECKING:
+    from pprs_dynamics.ros.live_joint_states import LiveNodes
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
 BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
 LAST_WORDS = 2.0  # [s] that work in the background gets to end
 IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
-
-
-class LiveSource(Protocol):
-    """Joint states as they come in."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return state and running errors."""
-
-    def take(self, path: Path) -> None:
-        """Write what the ring buffer holds as a recording."""
-
-    def machine(self) -> str:
-        """Return what would be set, in words, for a person to confirm; '' where no node runs."""
-
-    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
-        """Set a model on the running nodes, all or none; return what each said."""
-
-    def restore(self, confirmed: str) -> dict[str, Any]:
-        """Set the nodes back to what they had before the last model."""
-
-    def close(self) -> None:
-        """End it."""
 
 
 class Hub:
@@ -64,12 +44,12 @@ class Hub:
         Of the command line; a session begins with its recordings, or with the first that is opened.
     offered : Offered
         What browsers may choose from.
-    live : LiveSource, optional
+    live : LiveNodes, optional
     saved : SavedSession, optional
         What is taken over once the session has begun.
     """
 
-    def __init__(self, inputs: Inputs, offered: Offered, live: LiveSource | None = None,
+    def __init__(self, inputs: Inputs, offered: Offered, live: LiveNodes | None = None,
                  saved: SavedSession | None = None) -> None:
         self.inputs, self.offered, self.live, self.saved = inputs, offered, live, saved
         self.session: Session | None = None

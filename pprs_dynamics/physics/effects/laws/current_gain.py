@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, GainEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter, Wave
 from pprs_dynamics.physics.effects.laws.friction_temperature import (
     middle_temperature,
@@ -23,7 +23,7 @@ from pprs_dynamics.physics.effects.laws.friction_temperature import (
 WAVES = (1, 2, 3, 4, 5, 6)
 
 
-class CurrentGain(GainEffect):
+class CurrentGain(MeasurementEffect):
     """Torque per current that falls as magnets warm, or ripples as the motor turns.
 
     Efforts are currents times one constant; what the motor gives per current is another one.
@@ -77,10 +77,12 @@ class CurrentGain(GainEffect):
     waves = (Wave('ripple', 'phase', 'sine', 'cosine'),)
 
     @classmethod
-    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return (T - T_0, sin, cos of 2 pi q / p)."""
-        turn = 2 * math.pi * drive.position / shape['pitch']
-        return warmer_than(drive, shape['reference']), np.sin(turn), np.cos(turn)
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
+        """Return (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F."""
+        turn = 2 * math.pi * drive.position / parameters['pitch']
+        by_temperature = parameters['temperature'] * warmer_than(drive, parameters['reference'])
+        ripple = parameters['ripple'] * np.sin(turn + parameters['phase'])
+        return effort * (1 + by_temperature + ripple)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:

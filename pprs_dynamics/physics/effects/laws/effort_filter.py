@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import ALONE, DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.first_order import first_order
 
@@ -68,14 +68,14 @@ class EffortFilter(MeasurementEffect):
         return [{'time_constant': float(T)} for T in np.geomspace(SHORTEST, LONGEST, TRIALS)]
 
     @classmethod
-    def sensor_deviations(cls, effort: Array, time: Array | None, /, **shape: float,
+    def sensor_deviations(cls, effort: Array, drive: DriveSamples, **shape: float,
                           ) -> tuple[Array, ...]:
         """Return what one lag instead of two adds, of which other orders do a share."""
-        if time is None or len(time) < 2:
+        if drive.time is None or len(drive.time) < 2:
             return (np.zeros_like(effort),)
-        step = float(np.median(np.diff(time)))
-        two = cls({ALONE: shape}).sensed(effort[:, None], time, (ALONE,))[:, 0]
-        return (lag(effort, step, shape['time_constant'], effort[0], effort[0]) - two,)
+        step = float(np.median(np.diff(drive.time)))
+        one = lag(effort, step, shape['time_constant'], effort[0], effort[0])
+        return (one - cls.sense(effort, drive, **shape),)
 
     @classmethod
     def drive_memory(cls) -> Any:
@@ -83,11 +83,12 @@ class EffortFilter(MeasurementEffect):
         return {'time': None, 'states': None}
 
     @classmethod
-    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
-                     memory: Any) -> Array:
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
         """Return the filtered effort, (N,), of a filter that had settled at the first sample."""
+        time = drive.time
         if time is None or not len(time):
             return effort
+        memory = cls.drive_memory() if drive.memory is None else drive.memory
         is_first = memory['time'] is None
         times = time if is_first else np.concatenate(([memory['time']], time))
         step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0

@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 
 
@@ -49,7 +46,6 @@ class EffortGain(MeasurementEffect):
                         scale=0.05, expected=(0.04, 0.04)),)
 
     @classmethod
-    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
-                     memory: Any) -> Array:
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
         """Return (1 + g) F."""
         return (1 + parameters['gain']) * effort

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.physics.effects.added_body import AddedBody, Place
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.mechanism.alike import alike_links
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
@@ -53,5 +53,4 @@ class LinkMass(AddedBody):
     def bound(cls, robot: Any) -> Any:
         """Return the effect on the links of a robot that have mass."""
         return cls if robot is None else cls.on(
-            tuple(Place.of(one, f'{one.link}.') for one in robot.link_places),
-            alike_links(robot), robot.moved_mass)
+            robot.link_places, alike_links(robot), robot.moved_mass)

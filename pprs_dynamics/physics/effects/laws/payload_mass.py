@@ -8,8 +8,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from pprs_dynamics.physics.effects.added_body import AddedBody, Place, body_parameters
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.effects.added_body import AddedBody, body_parameters
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, BodyPlace
 
 
 class PayloadMass(AddedBody):
@@ -43,10 +43,10 @@ class PayloadMass(AddedBody):
 
     name = 'payload_mass'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    places = (Place('', 'the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
+    places = (BodyPlace('the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
     linear = body_parameters('', 'the tool', (0.0, 0.0, 0.0), inf)[:1]
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the body at the tool of a robot."""
-        return cls if robot is None else cls.on((Place.of(robot.tool_place),), (), robot.moved_mass)
+        return cls if robot is None else cls.on((robot.tool_place,), (), robot.moved_mass)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 
 # [s], always tried: filters and buses of drives delay by less. Longer delays (a logger of another
@@ -77,11 +77,12 @@ class TimeDelay(MeasurementEffect):
         return {'time': np.zeros(0), 'effort': np.zeros(0)}
 
     @classmethod
-    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
-                     memory: Any) -> Array:
+    def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:
         """Return F(t - d) by straight lines between samples and beyond them."""
+        time = drive.time
         if time is None:
             return effort
+        memory = cls.drive_memory() if drive.memory is None else drive.memory
         before = len(memory['time'])
         t = np.concatenate((memory['time'], time))
         F = np.concatenate((memory['effort'], effort))
