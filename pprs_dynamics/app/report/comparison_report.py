@@ -24,14 +24,13 @@ EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 def drives_table(comparison: Comparison) -> PlainTable:
     """Return the numbers of every drive; the page shows all of them, the terminal the first."""
-    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')
+    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise')
     return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name
                        for name in headings)), [
         (name, plain(drive.rms), percent(drive.relative),
          rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
          percent(drive.explained_variance),
-         '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
-         f'{drive.effective_samples:.0f} of {drive.samples}')
+         '' if drive.noise_floor is None else plain(drive.noise_floor, 2))
         for name, drive in comparison.drives.items()]
 
 
@@ -84,8 +83,8 @@ def _drives_table(comparison: Comparison) -> Any:
     short = len(comparison.unit) > 1
     return text_table(
         [heading.partition(' [')[0] if short and not heading.startswith('rms') else heading
-         for heading in headings[:7]],
-        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
+         for heading in headings],
+        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:])
          for row, drive in zip(rows, comparison.drives.values(), strict=True)], frame='none')
 
 
