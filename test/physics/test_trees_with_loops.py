@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_evaluation
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 
 SAMPLES = 30
@@ -65,8 +64,9 @@ def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize('name', ['hexapod', 'five_bar'])
 def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
-    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01} for one in friction_rows(
-        DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
+    structure = DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure
+    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
+              for one in structure.friction_rows}
     model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
