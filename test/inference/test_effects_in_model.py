@@ -44,7 +44,7 @@ WRONG: dict[str, tuple[Effects, Effects]] = {
     'another delay on one of two drives': (
         {'time_delay': {'slide_1.delay': 0.004, 'lift_1.delay': 0.004}},
         {'time_delay': {'slide_1.delay': 0.012, 'lift_1.delay': 0.004}}),
-    'a zero that is not off': ({'homing_error': {'slide_1.zero': 0.002}}, {}),
+    'a zero that is not off': ({'homing_error': {'slide_1.zero': 0.004}}, {}),
 }
 
 

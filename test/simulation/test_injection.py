@@ -88,21 +88,6 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: DriveModel, of: str) 
         loaded.rigid_force - state.rigid_force, abs=1e-8)
 
 
-def test_a_hidden_link_mass_is_that_of_the_model(model: DriveModel) -> None:
-    motion = draw_motion(model, 10.0, 1)
-    engine = MechanismEngine(model)
-    before = engine.torques(motion)
-    robot = model.robot
-    m, *moment = robot.inertial[1, :4]
-    frame = robot.structure.links[robot.body_names[1]][1].inverse
-    engine.carry(robot.body_names[1], body_at(0.7, tuple(frame.of_point(
-        np.array(moment) / m)), np.zeros((3, 3))))
-    loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['link_mass'],
-                          'effects.link_mass.beam.mass': 0.7}, model.source)
-    assert engine.torques(motion) - before == pytest.approx(
-        loaded.drive_forces(motion).parts['link_mass'], abs=1e-8)
-
-
 def test_without_effects_the_model_leaves_noise(model: DriveModel) -> None:
     run = simulate_mechanism(model, (), 0, noise=0.3)
     error = run.effort - model.drive_forces(run.motion).total
