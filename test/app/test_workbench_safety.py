@@ -220,25 +220,6 @@ def test_a_number_that_is_none_is_a_sentence(bench: Workbench, number: str) -> N
         assert answer.json['error']
 
 
-def test_a_second_browser_sees_the_same_session_and_cannot_corrupt_it(bench: Workbench) -> None:
-    token = bench.post('/api/invite').json['address'].rpartition('=')[2]
-    second = Workbench(bench.process, f'http://127.0.0.1:{bench.port}/?token={token}')
-    second.enter()
-    revision = bench.settled()['revision']
-    assert second.screen()['revision'] == revision
-    assert bench.post('/api/tick', effect='payload_mass', revision=revision).status == 200
-    ticked = [one['name'] for one in second.screen()['effects'] if one['is_ticked']]
-    assert ticked == ['payload_mass']
-    # It still shows the state before, and acts on that.
-    late = second.post('/api/tick', effect='payload_mass', is_ticked=False, revision=revision)
-    assert late.status == 409
-    assert 'changed elsewhere' in late.json['error']
-    assert [one['name'] for one in bench.screen()['effects'] if one['is_ticked']] == ticked
-    now = second.screen()['revision']
-    assert second.post('/api/tick', effect='payload_mass', is_ticked=False,
-                       revision=now).status == 200
-
-
 def test_nobody_else_on_the_network_is_listened_to(bench: Workbench) -> None:
     others = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None)
               if not str(entry[4][0]).startswith(('127.', '::1'))}

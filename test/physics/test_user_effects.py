@@ -78,22 +78,6 @@ def test_a_model_file_uses_an_effect_of_another_package(installed: Path, tmp_pat
     np.testing.assert_allclose(force, expected, rtol=1e-14)
 
 
-LOAD = """
-import sys
-from pprs_dynamics import DriveModel, PprsError
-try:
-    DriveModel.load(sys.argv[1])
-except PprsError as error:
-    print(error)
-"""
-
-
-def test_without_the_package_the_effect_is_unknown(tmp_path: Path) -> None:
-    file = model_file(tmp_path, {'active': ['eddy_brake']})
-    done = python(LOAD, tmp_path, file)
-    assert 'effects.active: unknown effect eddy_brake (known: ' in done.stdout
-
-
 LIST = """
 from pprs_dynamics.physics.effects.catalogue import catalogue
 print(*catalogue())

@@ -175,24 +175,6 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
         assert pinocchio.buildModelFromUrdf(str(file)).nv > 12
 
 
-@pytest.mark.parametrize(('joint', 'parameter', 'left'), [
-    ('elbow_1l', 'viscous', ()), ('elbow_1l', 'torque', ()),
-    ('elbow_1l', 'coulomb', ('joint_friction',)), ('ball_1l', 'viscous', ('joint_friction',))])
-def test_friction_of_passive_joints_that_was_adopted(
-    joint: str, parameter: str, left: tuple[str, ...],
-) -> None:
-    model = DriveModel.load('config/delta.yaml')
-    bare = {key: value for key, value in model.values.items()
-            if not key.startswith('friction.joints')}
-    model = DriveModel.from_parameters({**bare, 'friction.coulomb': (0.0,) * 3,
-                         'effects.active': ('joint_friction',),
-                         f'effects.joint_friction.{joint}.{parameter}': 0.02}, model.source)
-    expressed = express(model, MJCF)
-    assert expressed.not_expressed == left
-    # Dry friction turns over at once in the file, within a width in the model.
-    assert (replay_error(model, MJCF) < 1e-8) == (not left and parameter == 'viscous')
-
-
 def test_an_arm_in_another_library(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
                          friction__coulomb=[6.0, 4.0, 9.0])

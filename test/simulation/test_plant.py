@@ -148,26 +148,6 @@ def test_effects_change_while_it_runs(platform: DriveModel) -> None:
         plant.inject(['base_tilt:lift_1'])
 
 
-def test_hidden_friction_by_load_follows_the_effort_of_the_moment(tmp_path: Path) -> None:
-    model = models(tmp_path)['arm']
-    plain, hidden = Plant(model), Plant(model, ['load_friction'], seed=4)
-    (truth,) = hidden.injected
-    j = model.drives.index(truth['drives'][0])
-    coefficient, reference = (truth['parameters'][model.drives[j]][key]
-                              for key in ('coefficient', 'reference'))
-    q, v = plain.position, np.full(len(plain.position), 1.0)
-    for lean in (0.0, 0.8):  # of the arm, by which other weights act
-        p = q + lean
-        # Friction by load is of the acceleration of the step before, which is held here.
-        load = abs(plain.engine.torques(JointMotion(p[None], v[None], 0 * v[None]))[0, j])
-        needed = [one.acceleration(p, v, np.zeros(len(q)), v, 0.0) for one in (plain, hidden)]
-        # Accelerations per effort, whose inverse is the inertia.
-        per_effort = np.transpose([plain.acceleration(p, v, effort, v, 0.0) - needed[0]
-                                   for effort in np.eye(len(q))])
-        extra = np.linalg.solve(per_effort, needed[0] - needed[1])[j]
-        assert extra == pytest.approx(coefficient * np.cbrt(load ** 2 * reference), rel=1e-3)
-
-
 @pytest.mark.parametrize('gravity', [[0.0, 0.0, -9.81], [0.0, 9.81, 0.0]])
 def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
     tmp_path: Path, gravity: list[float],
