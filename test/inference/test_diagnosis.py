@@ -239,9 +239,8 @@ def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
         **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0),
         'effects.active': ['stribeck_friction'],
         effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
-    time = np.arange(0, 12.0, 0.002)  # a reversal within 1.5 mm/s lasts a few milliseconds
-    recording = record(true, noise=0.05, time=time)
-    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2).motion, time=time)
+    recording = record(true, noise=0.05)
+    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2).motion)
     found = diagnose(MODEL, [recording], [other])
     # The model that is judged on the other motion is the one that is adopted, with its widths.
     (effect_found,) = found.effects

@@ -20,14 +20,13 @@ EXCITATION = Excitation()
 
 
 def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
-           motion: Callable[[np.ndarray], PlatformMotion] = EXCITATION.motion,
-           time: np.ndarray = TIME) -> Recording:
+           motion: Callable[[np.ndarray], PlatformMotion] = EXCITATION.motion) -> Recording:
     """Return a recording of what a model says about a motion of times [s]."""
-    forces = model.drive_forces(motion(time).with_time(time))
+    forces = model.drive_forces(motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
     return Recording.from_arrays(
-        'made', time, forces.mechanism.position
+        'made', TIME, forces.mechanism.position
         + model.position_error(forces.mechanism.position),
         effort=said.total + noise * rng.normal(size=said.total.shape))
 
