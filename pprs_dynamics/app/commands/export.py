@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
                                   'not_expressed': list(expressed.not_expressed),
                                   **found.to_dict()})
     _say(screen, found, expressed.not_expressed)
-    screen.print(f'{options.to}: {shown(options.output)}')
+    screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0
 
 
