@@ -22,7 +22,6 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
@@ -559,7 +558,7 @@ def _joint_friction(run: Injection) -> Injected:
     structure = run.model.robot.structure
     groups = {'revolute': HINGES, 'spherical': BALLS} if isinstance(
         run.model, PlatformMechanism) else {
-            name: (name,) for name, (row, _) in friction_rows(structure).items()
+            name: (name,) for name, (row, _) in structure.friction_rows.items()
             if row >= 0 and name not in structure.drives}
     if not groups:
         raise InjectedEffectError('joint_friction needs a passive joint')
@@ -592,7 +591,7 @@ def _joint_spring(run: Injection) -> Injected:
     structure, closed = run.model.robot.structure, run.engine.closed(run.motion)
     groups = {'revolute': HINGES} if isinstance(run.model, PlatformMechanism) else {
         name: (name,) for name in structure.rows if name not in structure.drives
-        and name in friction_rows(structure)}
+        and name in structure.friction_rows}
     if not groups:
         raise InjectedEffectError('joint_spring needs a passive joint')
 
