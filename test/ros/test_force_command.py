@@ -168,6 +168,15 @@ def test_drives_are_held_where_they_are_with_their_gravity(moment: float) -> Non
     np.testing.assert_allclose(found.forces.mechanism.position, pose.mechanism.position, atol=1e-9)
 
 
+def test_a_path_has_come_to_rest_at_its_end_and_not_where_it_breaks_off() -> None:
+    node = Feedforward(MODEL, OWN)
+    assert not node.has_come_to_rest
+    for last, rests in ((1.0, False), (HelicalPath.duration, True)):
+        motion = HelicalPath().motion(np.linspace(last - 0.1, last, 11))
+        node.answer(TrajectoryRequest(motion, 0, STEP * np.arange(11)))
+        assert node.has_come_to_rest is rests
+
+
 def test_a_clock_that_is_set_back_multiplies_no_effect() -> None:
     """Friction that fades with time would grow without bound before its start."""
     node = Feedforward(REMEMBERS, OWN)
