@@ -228,7 +228,7 @@ class DriveControl:
         over = effort != wanted
         if over.any():
             for i in np.flatnonzero(over & ~self._at_limit):
-                unit = limits.effort_units[i]
+                unit = limits.units[i].effort
                 self._note(now, 'SATURATED', f'{limits.drives[i]} would need {wanted[i]:.4g} '
                            f'{unit}, {limits.effort_source} allows {limits.efforts[i]:g} {unit}')
         self._at_limit = over
@@ -252,7 +252,7 @@ class DriveControl:
             outside = (setpoint.position < lower) | (setpoint.position > upper)
             if outside.any():
                 i = int(np.argmax(outside))
-                unit = self._limits.position_units[i]
+                unit = self._limits.units[i].position
                 return (f'{self._limits.drives[i]} at {setpoint.position[i]:.6g} {unit} lies '
                         f'outside its stroke [{lower[i]:g}, {upper[i]:g}] {unit}')
         return ''

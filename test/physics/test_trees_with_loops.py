@@ -345,22 +345,6 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
                                                   np.tile(turned, (samples, 1))))
 
 
-def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
-    """A counterweight that slides as the drive turns is an inertia and a weight more."""
-    text = robots.RobotText('winch', tool='drum')
-    text.link('base')
-    text.link('drum', 2.0, (0, 0, 0), (0.1, 0.1, 0.1))
-    text.link('weight', 3.0, (0, 0, 0), (1, 1, 1))
-    text.joint('turn', 'revolute', 'base', 'drum', axis=(0, 1, 0))
-    text.joint('slide', 'prismatic', 'base', 'weight', axis=(0, 0, 1),
-               more='\n    <mimic joint="turn" multiplier="-0.2" offset="0.5"/>')
-    text.drives = ['turn']
-    model = DriveModel.load(text.write(tmp_path))
-    q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
-    expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
-    assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
-
-
 def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own(
     tmp_path: Path,
 ) -> None:

@@ -69,10 +69,9 @@ def read_mechanism(values: dict[str, Any], folder: Path,
 
 def joint_limits(structure: Structure) -> DriveLimits:
     """Return the ranges and efforts that a description has; infinite where it has none."""
-    units = [DriveUnits(kind == REVOLUTE) for kind in structure.kinds]
+    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
     return DriveLimits(
-        structure.drives, tuple(one.position for one in units), tuple(one.effort for one in units),
-        structure.lower, structure.upper, structure.effort,
+        structure.drives, units, structure.lower, structure.upper, structure.effort,
         ('its range in the URDF',) * len(units), 'the effort limit of URDF or node')
 
 

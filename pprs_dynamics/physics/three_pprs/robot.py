@@ -264,7 +264,7 @@ class ThreePprs:
     @property
     def numbers(self) -> Array:
         """All numbers that determine the forces, in one row."""
-        return self.kernel_parameters.row
+        return KernelParameters(self.kernel_parameters).row
 
     @property
     def position_step(self) -> float:
@@ -297,23 +297,22 @@ class ThreePprs:
         return replace(self, masses=altered)
 
     @cached_property
-    def kernel_parameters(self) -> KernelParameters[RobotParameters]:
+    def kernel_parameters(self) -> RobotParameters:
         """Geometry, masses and gravity."""
         masses = self.masses
         first, second, third = (ChainMasses(*chain) for chain in zip(
             masses.slides, masses.lifts, masses.rods, strict=True))
         body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
                             Vector(*masses.inertia[3:]))
-        return KernelParameters(RobotParameters(
-            self.geometry.kernel_parameters, body, (first, second, third),
-            Vector(*self.gravity)))
+        return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
+                               Vector(*self.gravity))
 
     def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
                    ) -> KernelParameters[closed_form.ForcesParameters]:
         """Return the parameters of `forces_kernel` with friction of joints and drives."""
-        return self.kernel_parameters.extended(
-            closed_form.ForcesParameters, self.geometry.platform_radius, float(self.printed),
-            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives)
+        return KernelParameters(closed_form.ForcesParameters(
+            self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
+            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives))
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
                      ) -> Mechanism:
