@@ -210,8 +210,8 @@ def reveal(story: Story, diagnosis: dict[str, Any], added: bool) -> str:
     """Open the file with the truth, and return how the diagnosis did, in a sentence."""
     story.chapter('What was hidden')
     hidden, = story.read('truth.json')['effects']
-    table = Table(show_header=True, title_justify='left', title=f'{hidden["name"]}: '
-                  f'{escape(hidden["form"])}', title_style='bold')
+    table = Table(show_header=True, title_justify='left', title=hidden['name'],
+                  title_style='bold')
     table.add_column('')
     table.add_column('hidden in the robot', style='green')
     table.add_column('found from the recording', style='cyan')

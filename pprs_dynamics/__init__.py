@@ -50,7 +50,7 @@ if TYPE_CHECKING:
         DriveSamples,
         MeasurementEffect,
     )
-    from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
+    from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
     from pprs_dynamics.physics.effects.structure_effect import StructureEffect
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.drive_model import DriveModel
     from pprs_dynamics.physics.model.forces import Forces, ModelState
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'CatalogueEffect',
            'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
            'FitResult', 'Forces', 'HelicalPath', 'JointMotion', 'LimitError',
@@ -87,7 +87,7 @@ _HOMES = {
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
         'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),
-    'physics.effects.effect': ('Card', 'CatalogueEffect', 'Parameter'),
+    'physics.effects.effect': ('CatalogueEffect', 'Parameter'),
     'physics.effects.structure_effect': ('StructureEffect',),
     'physics.mechanism.joint_motion': ('JointMotion',),
     'physics.mechanism.motion': ('PlatformMotion',),

@@ -40,7 +40,6 @@ from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.injection import NAMES, links_that_weigh
 
 # Effects of real machines, and what each was taken for before it was in the catalogue.
@@ -196,7 +195,7 @@ def todo(model: Path, seeds: range, nothing: range, sets: range, only: Sequence[
     loaded = DriveModel.load(model)
     robot, structure = loaded.robot, loaded.robot.structure
     has_passive = any(row >= 0 and name not in structure.drives
-                      for name, (row, _) in friction_rows(structure).items())
+                      for name, (row, _) in structure.friction_rows.items())
     names = [name for name in NAMES if (has_passive or name != JointFrictionEffect.name)
              and (robot.motors or name != CoupledDrives.name)
              and (links_that_weigh(loaded) or name != LinkMass.name)

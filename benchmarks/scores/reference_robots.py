@@ -39,7 +39,6 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
 from pprs_dynamics.simulation.engine import MechanismEngine
@@ -129,7 +128,7 @@ class Robot:
     def passive(self) -> dict[str, tuple[float, float]]:
         """Torque and width of turning over of each passive joint that can rub [N m], [rad/s]."""
         structure = self.model.robot.structure
-        names = [name for name, (row, _) in friction_rows(structure).items()
+        names = [name for name, (row, _) in structure.friction_rows.items()
                  if row >= 0 and name not in structure.drives]
         closed, found = self.engine.closed(self.plain.motion), {}
         for name in names:

@@ -95,8 +95,6 @@ class DriveControl:
     ----------
     notes : list of Note
         One for every change for the worse, not one for every step.
-    saturated_steps : (D,) int array
-        How many steps each drive spent at its limit.
     """
 
     def __init__(self, limits: DriveLimits, weight: Callable[[Array], Array],
@@ -109,7 +107,6 @@ class DriveControl:
         self._delay_line: deque[Array] = deque(
             maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
-        self.saturated_steps = np.zeros(count, dtype=int)
         self._at_limit = np.zeros(count, dtype=bool)
         self._nothing = np.zeros(count)
         self.start(self._nothing)
@@ -230,9 +227,8 @@ class DriveControl:
         effort: Array = np.minimum(np.maximum(wanted, -limits.efforts), limits.efforts)
         over = effort != wanted
         if over.any():
-            self.saturated_steps += over
             for i in np.flatnonzero(over & ~self._at_limit):
-                unit = limits.effort_units[i]
+                unit = limits.units[i].effort
                 self._note(now, 'SATURATED', f'{limits.drives[i]} would need {wanted[i]:.4g} '
                            f'{unit}, {limits.effort_source} allows {limits.efforts[i]:g} {unit}')
         self._at_limit = over
@@ -256,7 +252,7 @@ class DriveControl:
             outside = (setpoint.position < lower) | (setpoint.position > upper)
             if outside.any():
                 i = int(np.argmax(outside))
-                unit = self._limits.position_units[i]
+                unit = self._limits.units[i].position
                 return (f'{self._limits.drives[i]} at {setpoint.position[i]:.6g} {unit} lies '
                         f'outside its stroke [{lower[i]:g}, {upper[i]:g}] {unit}')
         return ''

@@ -99,8 +99,6 @@ class JointForm:
 
     Parameters
     ----------
-    form : str
-        Its equation.
     draw : callable
         From a random generator and a moment: parameters, the size first.
     force : callable
@@ -109,7 +107,6 @@ class JointForm:
         Range of a turning joint that it needs [rad]; 0 where it acts in any.
     """
 
-    form: str
     draw: Callable[[np.random.Generator, JointMoment], dict[str, float]]
     force: Callable[[Mapping[str, float], JointMoment], Array]
     needs_turn: float = 0.0
@@ -149,98 +146,102 @@ def _accumulator(p: Mapping[str, float], m: JointMoment) -> Array:
 
 
 FORMS: dict[str, JointForm] = {
+    # c v_1 asinh(v / v_1)
     'viscous_friction': JointForm(
-        'c v_1 asinh(v / v_1)',
         lambda rng, m: {'coefficient': SIZE(rng) * m.effort / m.speed,
                         'thinning_velocity': 2 * m.speed},
         lambda p, m: p['coefficient'] * eyring(m.velocity, p['thinning_velocity'])),
+    # F v / sqrt(v^2 + w^2)
     'coulomb_friction': JointForm(
-        'F v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': SIZE(rng) * m.effort}, lambda p, m: p['force'] * m.sign),
+    # c v for v > 0, else 0
     'asymmetric_friction': JointForm(
-        'c v for v > 0, else 0', lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed},
+        lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed},
         lambda p, m: p['coefficient'] * np.maximum(m.velocity, 0.0)),
+    # F exp(-|v| / v_s) v / sqrt(v^2 + w^2)
     'stribeck_friction': JointForm(
-        'F exp(-|v| / v_s) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'velocity': 0.1 * m.speed},
         lambda p, m: p['force'] * np.exp(-np.abs(m.velocity) / p['velocity']) * m.sign),
+    # c v |v|
     'quadratic_friction': JointForm(
-        'c v |v|', lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed ** 2},
+        lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed ** 2},
         lambda p, m: p['coefficient'] * m.velocity * np.abs(m.velocity)),
+    # dmu |N|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2), N the effort, of guides the load across
     'load_friction': JointForm(
-        'dmu |N|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2), N the effort, of guides the load across',
         lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
         lambda p, m: p['coefficient'] * np.cbrt(m.pressed ** 2 * p['reference']) * m.sign),
+    # mu tau_0 (|tau| / tau_0)^0.9 v / sqrt(v^2 + w^2), mu_b in the place of mu_d by the share (1 -
+    # tau v / sqrt((tau v)^2 + (0.01 tau_0 v_0)^2)) / 2
     'gear_efficiency': JointForm(
-        'mu tau_0 (|tau| / tau_0)^0.9 v / sqrt(v^2 + w^2), mu_b in the place of mu_d by the share '
-        '(1 - tau v / sqrt((tau v)^2 + (0.01 tau_0 v_0)^2)) / 2',
         lambda rng, m: {'driving': 4 * SIZE(rng), 'driven_back': float(rng.uniform(0.0, 0.1)),
                         'reference': m.effort},
         lambda p, m: p['reference'] * (np.abs(m.load) / p['reference']) ** 0.9 * m.sign * (
             p['driven_back'] + (p['driving'] - p['driven_back']) * m.driving)),
+    # three springs that slip one after the other, F / 3 each, in the place of F sgn(v)
     'hysteresis': JointForm(
-        'three springs that slip one after the other, F / 3 each, in the place of F sgn(v)',
         lambda rng, m: {'force': SIZE(rng) * m.effort, 'stroke': 0.02 * float(
             np.ptp(m.position))},
         lambda p, m: sum((_slipping(m.position, p['force'] / 3, share * p['stroke'])
                           for share in (0.2, 0.6, 1.0)), -p['force'] * m.sign)),
+    # F exp(-t / T) v / sqrt(v^2 + w^2)
     'friction_drift': JointForm(
-        'F exp(-t / T) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
         lambda p, m: p['force'] * np.exp(-m.time / p['time']) * m.sign),
+    # c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = 900 K / (T + 95 K) (Vogel), T of the
+    # grease, of which the thermometer is late
     'friction_temperature': JointForm(
-        'c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = 900 K / (T + 95 K) (Vogel), T of '
-        'the grease, of which the thermometer is late',
         lambda rng, m: {'coefficient': 3 * SIZE(rng) * m.effort / m.speed,
                         'reference': float(rng.uniform(*REFERENCE)),
                         'thinning_velocity': 2 * m.speed},
         lambda p, m: p['coefficient'] * thinner(m.temperature, p['reference'])
         * eyring(m.velocity, p['thinning_velocity'])),
+    # constant
     'effort_offset': JointForm(
-        'constant', lambda rng, m: {'force': SIZE(rng) * m.effort},
+        lambda rng, m: {'force': SIZE(rng) * m.effort},
         lambda p, m: np.full_like(m.time, p['force'])),
+    # k (q - q_0)
     'drive_spring': JointForm(
-        'k (q - q_0)', lambda rng, m: {'stiffness': SIZE(rng) * m.effort / float(
+        lambda rng, m: {'stiffness': SIZE(rng) * m.effort / float(
             np.ptp(m.position)) * 2, 'zero': float(np.mean(m.position))},
         lambda p, m: p['stiffness'] * (m.position - p['zero'])),
+    # A sin(2 pi q / p + phi) + A / 4 sin(4 pi q / p)
     'force_ripple': JointForm(
-        'A sin(2 pi q / p + phi) + A / 4 sin(4 pi q / p)',
         lambda rng, m: {'force': 0.5 * SIZE(rng) * m.effort, 'phase': float(rng.uniform(0, 6)),
                         'pitch': np.pi / m.gear_ratio if m.gear_ratio > 1 else float(
                             np.ptp(m.position)) / 12},
         lambda p, m: p['force'] * (np.sin(2 * np.pi * m.position / p['pitch'] + p['phase'])
                                    + 0.25 * np.sin(4 * np.pi * m.position / p['pitch']))),
+    # k x^(3/2) (1 + v / (2 v_0)) beyond q_s on one side, x the way beyond it, v the speed into it
     'stop_contact': JointForm(
-        'k x^(3/2) (1 + v / (2 v_0)) beyond q_s on one side, x the way beyond it, v the speed into '
-        'it',
         lambda rng, m: _stop(m, float(rng.choice((-1.0, 1.0))), float(rng.uniform(0.05, 0.2)),
                              3 * SIZE(rng) * m.effort),
         lambda p, m: p['side'] * p['stiffness'] * np.maximum(
             p['side'] * (m.position - p['position']), 0.0) ** 1.5
         * (1 + p['side'] * m.velocity / (2 * m.speed))),
+    # p A dl/dq, p = p_0 (V_0 / V)^1.3, V falls by a third as the cylinder is drawn out
     'counterbalance': JointForm(
-        'p A dl/dq, p = p_0 (V_0 / V)^1.3, V falls by a third as the cylinder is drawn out',
         lambda rng, m: {'force': 5 * SIZE(rng) * m.effort, 'arm': float(rng.uniform(0.35, 0.75)),
                         'position': float(np.mean(m.position) + rng.uniform(-0.6, 0.6))},
         _accumulator, needs_turn=1.0),
+    # m a
     'drive_inertia': JointForm(
-        'm a', lambda rng, m: {'mass': 2 * SIZE(rng) * m.effort / float(
+        lambda rng, m: {'mass': 2 * SIZE(rng) * m.effort / float(
             np.abs(m.acceleration).max())},
         lambda p, m: p['mass'] * m.acceleration),
 }
 UNKNOWN: dict[str, JointForm] = {
+    # F / (1 + ((q - q_0) / w)^4)
     'local_bump': JointForm(
-        'F / (1 + ((q - q_0) / w)^4)',
         lambda rng, m: {'force': SIZE(rng) * m.effort, 'place': float(np.quantile(
             m.position, rng.uniform(0.3, 0.7))), 'width': 0.05 * float(np.ptp(m.position))},
         lambda p, m: p['force'] / (1 + ((m.position - p['place']) / p['width']) ** 4)),
+    # A sin(2 pi f t + phi)
     'vibration': JointForm(
-        'A sin(2 pi f t + phi)',
         lambda rng, m: {'force': SIZE(rng) * m.effort, 'frequency': 6 * 5 ** float(rng.random()),
                         'phase': float(rng.uniform(-np.pi, np.pi))},
         lambda p, m: p['force'] * np.sin(2 * np.pi * p['frequency'] * m.time + p['phase'])),
+    # c v of the next drive
     'drive_coupling': JointForm(
-        'c v of the next drive',
         lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed},
         lambda p, m: p['coefficient'] * m.next_velocity),
 }

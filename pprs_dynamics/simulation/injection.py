@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
@@ -41,8 +40,11 @@ from pprs_dynamics.simulation.injected_forms import (
     tilted,
 )
 from pprs_dynamics.simulation.platform import BALLS, HINGES, RODS, PlatformMechanism
-from pprs_dynamics.simulation.sensors import ButterworthFilter
-from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
+from pprs_dynamics.simulation.temperatures import (
+    REFERENCE,
+    draw_temperatures,
+    read_thermometers,
+)
 
 RATE = 100.0  # [Hz]
 CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders
@@ -111,12 +113,8 @@ def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RAT
     raise InjectedEffectError('no motion about home stays within the workspace')
 
 
-class Injected(NamedTuple):
-    """The truth about an injected effect: its drives, or None; its parameters; its equation."""
-
-    drives: list[str] | None
-    parameters: dict[str, Any]
-    form: str
+# The truth about an injected effect: its drives, or None, and its parameters.
+Injected = tuple[list[str] | None, dict[str, Any]]
 
 
 @dataclass
@@ -234,9 +232,8 @@ class Injecting:
 
     def inject_one(self, effect: Callable[[Any], Injected]) -> dict[str, Any]:
         """Inject the effect and return what is true about it."""
-        drives, parameters, form = effect(self)
-        return {'name': self.choice.name, 'drives': drives, 'parameters': parameters,
-                'form': form}
+        drives, parameters = effect(self)
+        return {'name': self.choice.name, 'drives': drives, 'parameters': parameters}
 
 
 class Injection(Injecting):
@@ -348,8 +345,7 @@ class Injection(Injecting):
             friction = self.plain.friction
         self.efforts = self.bodies + friction
         self.largest = np.abs(self.efforts).max(axis=0)
-        self.temperature = Climate.draw(self.climate, len(self.largest)).along(
-            self.time, self.motion.velocity)
+        self.temperature = draw_temperatures(self.climate, self.time, self.motion.velocity)
 
     def moment(self, joint: int) -> JointMoment:
         """Return a joint along the motion."""
@@ -443,7 +439,10 @@ def named(words: str, random: np.random.Generator, scale: float) -> Choice:
 
 
 def _eccentric_encoder(run: Injection) -> Injected:
-    """Inject an eccentric encoder, which the robot's control follows."""
+    """Inject an eccentric encoder, which the robot's control follows.
+
+    Behind a reading q the drive is at q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi.
+    """
     model, read, random = run.model, run.motion, run.random
     able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
     if not able:
@@ -477,21 +476,21 @@ def _eccentric_encoder(run: Injection) -> Injected:
     acceleration[:, j] = (slope * read.acceleration[:, j]
                           + (after - 2 * at + before) / step ** 2 * v ** 2)
     run.motion = replace(read, position=position, velocity=velocity, acceleration=acceleration)
-    return Injected([model.drives[j]], {model.drives[j]: {
-        'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}},
-        'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
+    return [model.drives[j]], {model.drives[j]: {
+        'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}}
 
 
 def _payload_mass(run: Injecting) -> Injected:
+    """Hang a point of a share of the robot's mass 5 cm before the tool."""
     engine = run.engine
     share = run.sizes(lambda: {'share': run.size(0.05, 0.12)})['share']
     mass = share * float(engine.robot.masses.sum())
     engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, 0.05), np.zeros((3, 3))))
-    return Injected(None, {'mass': mass}, 'a point 5 cm before the tool')
+    return None, {'mass': mass}
 
 
 def _link_mass(run: Injecting) -> Injected:
-    """Make a link heavier by a share of its mass, or all rods of a 3-PPRS."""
+    """Add a share of its mass to a link at its centre, or to all rods of a 3-PPRS."""
     engine, robot = run.engine, run.engine.robot
     rods = isinstance(run.model, PlatformMechanism)
 
@@ -506,7 +505,7 @@ def _link_mass(run: Injecting) -> Injected:
         mass = share * float(parameters[0])
         centre = engine.structure.links[link][1].inverse.of_point(parameters[1:4] / parameters[0])
         engine.carry(link, body_at(mass, tuple(centre), np.zeros((3, 3))))
-    return Injected(None, {f'{name}.mass': mass}, 'a point at its centre')
+    return None, {f'{name}.mass': mass}
 
 
 def links_that_weigh(model: DriveModel) -> list[int]:
@@ -527,11 +526,11 @@ def _payload_offset(run: Injection) -> Injected:
     offset = run.sizes(lambda: {
         axis: run.size(0.003, 0.015) * float(run.random.choice((-1.0, 1.0))) for axis in 'xyz'})
     run.engine.shift_tool(np.array([*offset.values()]))
-    return Injected(None, offset, 'the centre of mass elsewhere')
+    return None, offset
 
 
 def _platform_inertia(run: Injection) -> Injected:
-    """Inject a beam across the tool, whose inertia about one axis in its plane is 0."""
+    """Inject a beam across the tool, of inertia I (E - a a^T), a = (cos beta, sin beta, 0)."""
     _require_platform(run.model, 'platform_inertia')
     sizes = run.sizes(lambda: {
         'inertia': run.scale * float(np.exp(run.random.uniform(np.log(0.01), np.log(0.04)))),
@@ -540,26 +539,26 @@ def _platform_inertia(run: Injection) -> Injected:
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     run.engine.carry(run.model.robot.structure.tool, body_at(
         0.0, (0.0,) * 3, inertia * (np.eye(3) - np.outer(along, along))))
-    return Injected(None, sizes, 'I (E - a a^T), a = (cos beta, sin beta, 0)')
+    return None, sizes
 
 
 def _payload_pick_up(run: Injection) -> Injected:
-    """Inject a payload that the tool takes in the middle of the motion. Not in the catalogue."""
+    """Hang a point 5 cm before the tool from a time on. Not in the catalogue."""
     require_tool(run.model, 'payload_pick_up')
     sizes = run.sizes(lambda: {
         'mass': run.size(0.05, 0.12) * float(run.engine.robot.masses.sum()),
         'time': float(np.quantile(run.time, run.random.uniform(0.1, 0.4)))})
     share = np.clip((run.time - sizes['time']) / PICK_UP_TIME, 0.0, 1.0)
     run.picked = share, body_at(sizes['mass'], (0.0, 0.0, 0.05), np.zeros((3, 3)))
-    return Injected(None, sizes, 'a point 5 cm before the tool from t on')
+    return None, sizes
 
 
 def _joint_friction(run: Injection) -> Injected:
-    """Inject dry friction of a passive joint, of all of a kind in a 3-PPRS."""
+    """Inject T w / sqrt(w^2 + w_0^2) in a passive joint, in all of a kind in a 3-PPRS."""
     structure = run.model.robot.structure
     groups = {'revolute': HINGES, 'spherical': BALLS} if isinstance(
         run.model, PlatformMechanism) else {
-            name: (name,) for name, (row, _) in friction_rows(structure).items()
+            name: (name,) for name, (row, _) in structure.friction_rows.items()
             if row >= 0 and name not in structure.drives}
     if not groups:
         raise InjectedEffectError('joint_friction needs a passive joint')
@@ -584,15 +583,15 @@ def _joint_friction(run: Injection) -> Injected:
     rows = rows_of(name)
     run.passive += np.einsum('nk,nki,nkiv->nv', torque / np.hypot(speed_of(rows), width),
                              np.einsum('nkiv,nv->nki', rows, closed.velocity), rows)
-    return Injected(None, {f'{name}.torque': torque}, 'T w / sqrt(w^2 + w_0^2)')
+    return None, {f'{name}.torque': torque}
 
 
 def _joint_spring(run: Injection) -> Injected:
-    """Inject springs in passive joints, in all hinges of a 3-PPRS."""
+    """Inject k x (1 + (x / x_h)^2), x = u - u_0, in a passive joint, in all hinges of a 3-PPRS."""
     structure, closed = run.model.robot.structure, run.engine.closed(run.motion)
     groups = {'revolute': HINGES} if isinstance(run.model, PlatformMechanism) else {
         name: (name,) for name in structure.rows if name not in structure.drives
-        and name in friction_rows(structure)}
+        and name in structure.friction_rows}
     if not groups:
         raise InjectedEffectError('joint_spring needs a passive joint')
 
@@ -608,8 +607,7 @@ def _joint_spring(run: Injection) -> Injected:
     off = closed.position[:, [run.engine.state.place(joint) for joint in groups[name]]] - rest
     run.passive[:, [run.engine.state.dof(joint) for joint in groups[name]]] += (
         stiffness * off * (1 + (off / way) ** 2))
-    return Injected(None, {f'{name}.stiffness': stiffness, f'{name}.position': rest},
-                    'k x (1 + (x / x_h)^2), x = u - u_0')
+    return None, {f'{name}.stiffness': stiffness, f'{name}.position': rest}
 
 
 def _base_tilt(run: Injecting) -> Injected:
@@ -617,7 +615,7 @@ def _base_tilt(run: Injecting) -> Injected:
     require_tool(run.model, 'base_tilt')
     angle = run.sizes(lambda: {'x': run.size(0.01, 0.03)})['x']
     run.engine.gravity = tilted(run.engine.gravity, angle)
-    return Injected(None, {'x': angle, 'y': 0.0}, 'about x')
+    return None, {'x': angle, 'y': 0.0}
 
 
 def _external_wrench(run: Injection) -> Injected:
@@ -625,11 +623,11 @@ def _external_wrench(run: Injection) -> Injected:
     force = run.sizes(lambda: {
         'force_z': run.scale * 0.05 * float(np.abs(run.plain.effort).max())})['force_z']
     run.engine.wrench = run.engine.wrench + np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
-    return Injected(None, {'force_z': force}, 'at the tool')
+    return None, {'force_z': force}
 
 
 def _tool_drag(run: Injection) -> Injected:
-    """Inject a liquid or a curtain that the tool moves through."""
+    """Let the tool move through a liquid: c v sqrt(1 + (|v| / v_1)^2)."""
     require_tool(run.model, 'tool_drag')
     velocity = run.engine.tool_velocity(run.engine.closed(run.motion))
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -639,7 +637,7 @@ def _tool_drag(run: Injection) -> Injected:
     turbulent, coefficient = sizes.values()
     drag = coefficient * np.hypot(1.0, speed / turbulent) * velocity
     run.engine.wrench = run.engine.wrench + np.concatenate((drag, np.zeros_like(drag)), axis=1)
-    return Injected(None, sizes, 'c v sqrt(1 + (|v| / v_1)^2)')
+    return None, sizes
 
 
 def _require_platform(model: DriveModel, name: str) -> None:
@@ -660,9 +658,9 @@ def require_tool(model: DriveModel, name: str) -> None:
 def _elastic_joint(run: Injection) -> Injected:
     """Inject a gear that winds up under load.
 
-    A harmonic drive that stiffens, w + (w / w_1)^2 w = tau / k, and creeps: a share of it comes
-    late, by a relaxation (a standard linear solid). It is in a joint that turns, where there is
-    one behind the first: a slide that carries no weight would not feel it.
+    A harmonic drive that stiffens, tau / tau_0 = x + x^3 / 4 with x = w / w_0, and creeps: a share
+    of it comes late, by a relaxation (a standard linear solid). It is in a joint that turns, where
+    there is one behind the first: a slide that carries no weight would not feel it.
     """
     model, random = run.model, run.random
     later = range(min(1, len(model.drives) - 1), len(model.drives))
@@ -683,9 +681,8 @@ def _elastic_joint(run: Injection) -> Injected:
     # The real root of x + x^3 / 4 = felt, x = w / span.
     x = 4 / np.sqrt(3) * np.sinh(np.arcsinh(0.75 * np.sqrt(3) * felt) / 3)
     run.windup[:, joint] = span * x
-    return Injected([model.drives[joint]], {model.drives[joint]: {
-        'compliance': span / largest, 'loss': late * time}},
-        'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
+    return [model.drives[joint]], {model.drives[joint]: {
+        'compliance': span / largest, 'loss': late * time}}
 
 
 def _lost_motion(run: Injection) -> Injected:
@@ -711,8 +708,7 @@ def _lost_motion(run: Injection) -> Injected:
     else:
         run.lead = lead
     name = run.model.drives[joint]
-    return Injected([name], {name: {'backlash' if by_load else 'play': span}},
-                    'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
+    return [name], {name: {'backlash' if by_load else 'play': span}}
 
 
 # --------------------------------------------------------------------------- drives, amplifiers
@@ -734,11 +730,14 @@ def _force(name: str, run: Injection) -> Injected:
     for drive, (effort, speed, drawn) in sizes.items():
         j = model.drives.index(drive)
         run.efforts[:, j] += form.force(drawn, replace(run.moment(j), effort=effort, speed=speed))
-    return Injected([*sizes], {drive: drawn for drive, (_, _, drawn) in sizes.items()}, form.form)
+    return [*sizes], {drive: drawn for drive, (_, _, drawn) in sizes.items()}
 
 
 def _coupled_drives(run: Injection) -> Injected:
-    """Inject friction of a motor that moves several joints."""
+    """Inject friction of a motor that moves several joints, v the speed of the motor:
+
+    A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)).
+    """
     motors = run.model.robot.motors
     if not motors:
         raise InjectedEffectError('coupled_drives needs a motor that moves several joints: write '
@@ -759,15 +758,14 @@ def _coupled_drives(run: Injection) -> Injected:
     friction = (dry * algebraic_sign(speed, STEEPNESS * top)
                 + viscous * eyring(speed, 2 * top) / top)
     run.efforts += np.outer(friction, row)
-    return Injected(None, {f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
-                    "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+    return None, {f'{name}.coulomb': dry, f'{name}.viscous': viscous / top}
 
 
 def _effort_gain(run: Injection) -> Injected:
     joint, gain = run.sizes(
         lambda: {'joint': run.joint(), 'gain': run.size(0.04, 0.1)}).values()
     run.efforts[:, joint] *= 1 + gain
-    return Injected([run.model.drives[joint]], {'gain': gain}, '1 + gain')
+    return [run.model.drives[joint]], {'gain': gain}
 
 
 def _current_gain(run: Injection) -> Injected:
@@ -789,29 +787,32 @@ def _current_gain(run: Injection) -> Injected:
     if 'ripple' in p:
         turn = 2 * np.pi / p['pitch'] * run.motion.position[:, j] + p['phase']
         constant = 1 + p['ripple'] * (np.sin(turn) + 0.2 * np.sin(3 * turn))
-        form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
     else:
         warmer = run.temperature[:, j] - p['reference']
         constant = 1 - p['temperature'] * warmer * (1 + warmer / 300)
-        form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
     run.efforts[:, j] /= constant
-    return Injected([model.drives[j]], {model.drives[j]: p}, form)
+    return [model.drives[j]], {model.drives[j]: p}
 
 
 def _time_delay(run: Injection) -> Injected:
     delay = run.sizes(lambda: {'delay': run.size(0.008, 0.03)})['delay']
     run.efforts = np.stack([np.interp(run.time - delay, run.time, column)
                             for column in run.efforts.T], axis=1)
-    return Injected(list(run.model.drives), {'delay': delay}, 'all efforts late')
+    return list(run.model.drives), {'delay': delay}
 
 
 def _effort_filter(run: Injection) -> Injected:
+    """Inject a Butterworth low-pass of second order, T = sqrt(2) / (2 pi f_c)."""
+    from scipy.signal import butter, lfilter, lfilter_zi
+
     time_constant = run.sizes(
         lambda: {'time_constant': run.size(0.01, 0.04)})['time_constant']
-    run.efforts = ButterworthFilter(np.full(len(run.largest), time_constant), float(
-        np.median(np.diff(run.time)))).samples(run.efforts)
-    return Injected(list(run.model.drives), {'time_constant': time_constant},
-                    'low-pass of second order (Butterworth), T = sqrt(2) / (2 pi f_c)')
+    rate = 1 / float(np.median(np.diff(run.time)))
+    highest = 0.45 * rate  # no samples show what is faster
+    b, a = butter(2, min(np.sqrt(2) / (2 * np.pi * time_constant), highest), fs=rate)
+    run.efforts, _ = lfilter(b, a, run.efforts, axis=0,
+                             zi=lfilter_zi(b, a)[:, None] * run.efforts[0])
+    return list(run.model.drives), {'time_constant': time_constant}
 
 
 def _homing_error(run: Injection) -> Injected:
@@ -823,7 +824,7 @@ def _homing_error(run: Injection) -> Injected:
     joint, zero = run.sizes(draw).values()
     run.shift[joint] = zero
     name = run.model.drives[joint]
-    return Injected([name], {name: {'zero': zero}}, 'positions shifted')
+    return [name], {name: {'zero': zero}}
 
 
 Effects = Mapping[str, Callable[[Injection], Injected]]

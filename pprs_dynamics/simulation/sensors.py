@@ -41,36 +41,6 @@ class SensorSettings:
         return np.round(position / grain) * grain if grain > 0 else position
 
 
-class ButterworthFilter:
-    """Low-pass filters of second order, one for each of D signals.
-
-    Parameters
-    ----------
-    time_constant : (D,) array
-        Mean delay of each, sqrt(2) / (2 pi f_c) [s]; 0 for none.
-    step : float
-        Between samples [s].
-    """
-
-    def __init__(self, time_constant: Array, step: float) -> None:
-        from scipy.signal import butter
-
-        self._filters = {}
-        for d in np.flatnonzero(time_constant > 0).tolist():
-            highest = 0.9 / (2 * step)  # of what is faster no samples tell
-            cutoff = min(np.sqrt(2) / (2 * np.pi * time_constant[d]), highest)
-            self._filters[d] = butter(2, cutoff, fs=1 / step)
-
-    def samples(self, values: Array) -> Array:
-        """Return signals filtered from rest at their first values, (N, D)."""
-        from scipy.signal import lfilter, lfilter_zi
-
-        filtered = values.copy()
-        for d, (b, a) in self._filters.items():
-            filtered[:, d], _ = lfilter(b, a, values[:, d], zi=lfilter_zi(b, a) * values[0, d])
-        return filtered
-
-
 @dataclass(frozen=True)
 class Measurement:
     """Readings of the sensors at one moment: `time` [s] and (D,) arrays in drive order."""

@@ -9,8 +9,6 @@ Thermal masses are those of a small test bench: what takes a real drive an hour 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -24,53 +22,28 @@ VOGEL_B, VOGEL_C = 900.0, 95.0  # of mineral oils [K]
 LAG = 0.2  # by which it is late [s]
 
 
-@dataclass(frozen=True)
-class Climate:
-    """Hall and drives.
+def draw_temperatures(rng: np.random.Generator, time: Array, velocity: Array) -> Array:
+    """Return random temperatures of drives along a motion, (N, D) [degC].
+
+    They begin at the temperature of the hall, and rise by a `RISE` at their mean speed.
 
     Parameters
     ----------
-    hall, wave, period, phase : float
-        Mean temperature of the hall [degC], and how it changes [K, s, rad].
-    rise, cooling : (D,) arrays
-        Of each drive [K, s].
+    rng : numpy.random.Generator
+    time : (N,) array
+        [s]
+    velocity : (N, D) array
     """
-
-    hall: float
-    wave: float
-    period: float
-    phase: float
-    rise: Array
-    cooling: Array
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, drives: int) -> Climate:
-        """Return a hall and so many drives."""
-        hall, wave, period, phase = (float(rng.uniform(*one)) for one in (
-            HALL, WAVE, PERIOD, (0, 2 * np.pi)))
-        return cls(hall, wave, period, phase, rng.uniform(*RISE, drives),
-                   rng.uniform(*COOLING, drives))
-
-    def along(self, time: Array, velocity: Array) -> Array:
-        """Return the temperatures of drives along a motion, (N, D) [degC].
-
-        They begin at the temperature of the hall, and rise by `rise` at their mean speed.
-
-        Parameters
-        ----------
-        time : (N,) array
-            [s]
-        velocity : (N, D) array
-        """
-        speed = np.abs(velocity)
-        work = speed / np.maximum(speed.mean(axis=0), 1e-12)
-        hall = self.hall + self.wave * np.sin(2 * np.pi * time / self.period + self.phase)
-        start = self.hall + self.wave * np.sin(self.phase)
-        found = np.full_like(velocity, start)
-        for k, step in enumerate(np.diff(time)):
-            found[k + 1] = found[k] + step * (
-                hall[k] + self.rise * work[k] - found[k]) / self.cooling
-        return found
+    mean, wave, period, phase = (float(rng.uniform(*one)) for one in (
+        HALL, WAVE, PERIOD, (0, 2 * np.pi)))
+    rise, cooling = (rng.uniform(*each, velocity.shape[1]) for each in (RISE, COOLING))
+    speed = np.abs(velocity)
+    work = speed / np.maximum(speed.mean(axis=0), 1e-12)
+    hall = mean + wave * np.sin(2 * np.pi * time / period + phase)
+    found = np.full_like(velocity, mean + wave * np.sin(phase))
+    for k, step in enumerate(np.diff(time)):
+        found[k + 1] = found[k] + step * (hall[k] + rise * work[k] - found[k]) / cooling
+    return found
 
 
 def thinner(temperature: Array, reference: Array | float) -> Array:

@@ -27,7 +27,6 @@ from pprs_dynamics import (
     UnreadableFileError,
     adopt,
     compare,
-    simulate,
     write_recording,
 )
 from pprs_dynamics.app.commands.pprs import main
@@ -121,22 +120,6 @@ def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
     for recordings in (None, 3, [None], pd.DataFrame({'time': [0.0]}), np.zeros((3, 2))):
         with pytest.raises(PprsError, match='must be a path or a Recording'):
             call('config/paper.yaml', recordings)
-
-
-def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
-    run = simulate('config/paper.yaml', 'effort_offset', seed=3, duration=2.0)
-    plain = simulate('config/paper.yaml', seed=3, duration=2.0)
-    (hidden,) = run.effects
-    assert hidden['name'] == 'effort_offset'
-    difference = np.abs((run.recording.effort - plain.recording.effort).mean(axis=0))
-    drives = [run.recording.drives[d] for d in np.flatnonzero(difference > 0.05)]
-    assert drives == hidden['drives']
-    other = simulate('config/paper.yaml', 'effort_offset', seed=3, duration=2.0, path_seed=1)
-    assert other.effects == run.effects
-    run.save(tmp_path / 'run.csv')
-    read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
-    assert read.effort == pytest.approx(run.recording.effort)
-    assert run.to_dict()['samples'] == len(read.time)
 
 
 def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""compare --mcap: files for PlotJuggler and Foxglove."""
+"""compare --mcap and --beside: files for PlotJuggler and Foxglove; two models on one recording."""
 
 from __future__ import annotations
 
@@ -68,3 +68,19 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
     np.testing.assert_allclose(arrays['/residual'], arrays['/measured'] - arrays['/model'])
     np.testing.assert_allclose(arrays['/model'], sum(arrays[topic] for topic in parts), atol=1e-9)
     assert arrays['/residual'][:, 0].mean() == pytest.approx(OFFSET, abs=0.02)
+
+
+def test_errors_of_two_models_on_one_recording(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(folder)
+    beside = 'better.yaml'
+    assert main(['compare', 'run.csv', '--beside', beside, '--json', 'both.json',
+                 '--report', 'both.html']) == 0
+    content = json.loads((folder / 'both.json').read_text())
+    assert content['beside']['name'] == beside
+    before, after = (one['drives']['slide_1']['rms'] for one in (content, content['beside']))
+    assert before == pytest.approx(OFFSET, rel=0.05)
+    assert after < 0.1
+    assert beside in capsys.readouterr().out
+    assert beside in (folder / 'both.html').read_text()

@@ -17,6 +17,7 @@ from pprs_command import pprs
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.app.report.terminal import as_text, shell_command, stacked, verdict_panel
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_writer import format_model
@@ -110,3 +111,14 @@ def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: st
     assert done.returncode == 0, done.stderr
     assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
     (folder / page).read_text(encoding='utf-8')
+
+
+def test_sentences_wrap_between_words_and_commands_stay_on_one_line() -> None:
+    sentence = 'With it the error falls from 0.123 N to 0.039 N, which is the noise. ' * 3
+    command = f'pprs adopt drive_inertia {"folder/" * 12}run.mcap --output better.yaml'
+    lines = as_text(stacked(sentence, verdict_panel('effect', 'cyan', sentence),
+                            shell_command(command)), 80).splitlines()
+    assert f'  {command}' in lines
+    text = [line.strip('│ ') for line in lines if command not in line and '─' not in line]
+    assert max(map(len, text)) <= 80
+    assert ' '.join(' '.join(text).split()) == ' '.join(f'{sentence}{sentence}'.split())

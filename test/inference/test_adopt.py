@@ -18,6 +18,7 @@ from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
+from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -30,7 +31,7 @@ from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
 HIDDEN, WRONG = 'coulomb_friction', 'drive_spring'
-DURATION = 15.0  # [s]
+DURATION = 8.0  # [s]
 NOISE = 0.05  # [N], of recordings made without the simulated robot
 
 
@@ -134,20 +135,17 @@ def test_blocks_of_the_same_recording_are_told_as_weak_evidence(files: Files) ->
 
 
 def test_force_overrides_and_is_recorded(files: Files) -> None:
-    output = files.folder / 'forced.yaml'
-    done = pprs('adopt', f'{WRONG}:lift_1', files.first, '--model', files.model, '--output',
-                output, '--force', '--json', files.folder / 'forced.json')
-    assert done.returncode == 0, done.stdout + done.stderr
-    step, = read_steps(read_parameters(output))
+    answer = requested(files, f'{WRONG}:lift_1', force=True)
+    assert answer.adopted
+    step, = read_steps(LedgerBook((RecordingEntry.of(files.recordings[0]),), ()).entered(
+        answer).values)
     assert step.forced
     assert 'explains these recordings better' in ' '.join(step.objections)
-    assert json.loads((files.folder / 'forced.json').read_text())['forced'] is True
-    assert 'by force' in done.stdout
 
 
 def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of a robot that differs from it."""
-    motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.002))
+    motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.005))
     forces = DriveModel.from_parameters({**default_parameters(), **recorded}).drive_forces(motion)
     noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
     return DriveModel.from_parameters({**default_parameters(), **values}), Recording.from_arrays(

@@ -14,10 +14,10 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics.inference.diagnosis.comparison import compare
-from pprs_dynamics.inference.diagnosis.localisation import Localisation, localise
+from pprs_dynamics.inference.diagnosis.localisation import Localisation
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.profiles import error_profile, error_spectrum
+from pprs_dynamics.inference.residuals.profiles import error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01
@@ -121,21 +121,6 @@ def test_profiles_hold_the_mean_within_their_uncertainty() -> None:
         off.append((profile.mean - 0.7) / profile.uncertainty)
     # The bins of one record go together; over twenty the spread is known to about a tenth.
     assert np.std(off) == pytest.approx(1.0, abs=0.3)
-
-
-def test_spectrum_shows_a_vibration_at_its_frequency_above_the_background() -> None:
-    rng = np.random.default_rng(13)
-    time = PERIOD * np.arange(4000)
-    error = (0.1 * rng.normal(size=4000) + 0.3 * np.sin(2 * np.pi * 12.5 * time))[:, None]
-    residuals = recording(error, np.zeros_like(error))
-    noise = localise(residuals).drives['drive_0'].noise
-    assert noise is not None
-    spectrum = error_spectrum(residuals, 0, noise)
-    top = int(np.argmax(spectrum.power))
-    assert spectrum.frequency[top] == pytest.approx(12.5, abs=0.05)
-    quiet = np.abs(spectrum.frequency - 12.5) > 5
-    assert np.median(spectrum.power[quiet] / spectrum.background[quiet]) == pytest.approx(
-        1, abs=0.45)
 
 
 def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:

@@ -16,8 +16,6 @@ from pprs_dynamics.inference.regression.constrained import (
     constrained,
     nearest,
 )
-from pprs_dynamics.inference.regression.joint_fit import Regression
-from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.body_centres import REACH
 from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.inference.search.constraints import DOUBTED, body_planes
@@ -73,33 +71,6 @@ def test_a_convex_set_is_reached_by_its_tangent_planes() -> None:
     found = nearest(mean, np.eye(3), Inequalities.none(3), planes)
     assert found is not None
     np.testing.assert_allclose(found.coefficients, mean / np.linalg.norm(mean), atol=1e-6)
-
-
-def two_columns() -> tuple[Regression, Array, Array]:
-    random = np.random.default_rng(0)
-    time = np.arange(2000) * 0.01
-    first = np.sin(2 * np.pi * 0.3 * time)
-    second = 0.8 * first + 0.6 * np.sin(2 * np.pi * 0.45 * time)
-    error = -0.3 * first - 0.2 * second + 0.5 * random.normal(size=2000)
-    return Regression(Residuals(('a',), time, np.zeros(2000, int), error[:, None],
-                                np.zeros((2000, 1)))), first, second
-
-
-def test_values_that_are_given_one_after_the_other_are_those_given_at_once() -> None:
-    regression, *rows = two_columns()
-    blocks = [regression.block({0: row}) for row in rows]
-    fit = regression.fit(blocks)
-    one = regression.held(fit, fit.index_of(blocks[:1]), np.array([0.1]))
-    both = regression.held(one, fit.index_of(blocks[1:]), np.array([0.0]))
-    at_once = regression.held(fit, fit.index_of(blocks), np.array([0.1, 0.0]))
-    np.testing.assert_allclose(both.coefficients, [0.1, 0.0], atol=1e-9)
-    assert both.deviance == pytest.approx(at_once.deviance, abs=1e-6)
-    # Independent: the misfit and the prior of these values at the same noise.
-    prior = sum(float(block.precision[0, 0]) * value ** 2
-                for block, value in zip(blocks, (0.1, 0.0), strict=True))
-    free = sum(float(block.precision[0, 0]) * float(fit.of(block)[0]) ** 2 for block in blocks)
-    rise = regression.misfit(at_once) + prior - regression.misfit(fit) - free
-    assert at_once.deviance - fit.deviance == pytest.approx(rise, rel=1e-6)
 
 
 def test_a_conditioned_gaussian_is_that_of_the_textbook() -> None:

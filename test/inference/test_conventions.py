@@ -28,7 +28,6 @@ from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, Choice
 
 MODEL = DriveModel.load()
-AXIS = DriveModel.load('config/single_axis.yaml')
 RATE, DURATION = 125.0, 8.0
 NOISE = 0.05  # [N]
 # Effects most like another unit or sign; the others are slow tests.
@@ -70,15 +69,10 @@ def ordered(*columns: int) -> Callable[[Arrays], Arrays]:
 MINUS, TIMES = 'looks like minus what the model says', 'times what the model says'
 MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
     'kN': (scaled(effort=1e-3), [f'effort of all drives looks like 0.001 {TIMES}, as if .* kN']),
-    'sign': (scaled(effort=-1.0), [f'effort of all drives {MINUS}']),
     'sign of a slide': (scaled(effort=[1, -1, 1, 1, 1, 1]), [f'effort of slide_2 {MINUS}']),
-    'a lift in kN': (scaled(effort=[1, 1, 1, 1e-3, 1, 1]), [f'of lift_1 looks like 0.001 {TIMES}']),
     'ms': (scaled(time=1e3), ['times look like milliseconds: .* 1000 times too slow']),
-    'mm': (scaled(motion=1e3), ['positions of all drives look like millimetres']),
     'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]),
                     ['positions of lift_1, lift_2, lift_3 .*milli']),
-    'negated': (scaled(motion=-1.0), ['positions of all drives look negated']),
-    'a slide negated': (scaled(motion=[1, 1, -1, 1, 1, 1]), ['position of slide_3 looks negated']),
     'a slide counts the other way': (
         scaled(motion=[-1, 1, 1, 1, 1, 1], effort=[-1, 1, 1, 1, 1, 1]),
         ['position of slide_1 looks negated', f'effort of slide_1 {MINUS}']),
@@ -182,21 +176,6 @@ def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: st
            [f'velocity of lift_1, lift_2, lift_3 is {word}'])
 
 
-def test_a_real_drive_is_called_right() -> None:
-    from benchmarks.real import emps_files as emps
-    from benchmarks.real.recorded_data import find_data, missing
-
-    data = find_data('emps', emps.IDENTIFICATION)
-    if data is None:
-        pytest.skip(missing('emps'))
-    for name in (emps.IDENTIFICATION, emps.PULSES):
-        run = emps.read_emps(data / name)
-        assert find_mistakes(AXIS, run) == ()
-        (finding,) = find_mistakes(AXIS, Recording.from_arrays(
-            'minus', run.time, run.position, None, -run.effort, ('axis',)))
-        assert MINUS in finding.what
-
-
 def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
     write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
     write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
@@ -289,8 +268,7 @@ OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of i
 def test_recordings_of_other_people(case: str) -> None:
     folder, model_file, run, clause = OTHERS[case]
     model, whole = shared_case(folder, model_file, run)
-    count = len(whole.time)
-    for part in (slice(0, count), slice(count // 3, count)):
-        piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
-                                      whole.effort[part], model.drives)
-        expect([one.what for one in find_mistakes(model, piece)], [clause] * bool(clause))
+    part = slice(len(whole.time) // 3, None)
+    piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
+                                  whole.effort[part], model.drives)
+    expect([one.what for one in find_mistakes(model, piece)], [clause] * bool(clause))

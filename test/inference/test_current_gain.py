@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
 
 JOINT = 1
@@ -67,17 +66,6 @@ def test_columns_are_differences_of_models(arm):
                        np.array([0, 0, 0.01]))):
         changed = Design.of(with_gain(arm, **values), [recorded(arm, arm)])
         assert_allclose(changed.forces[:, JOINT] - design.forces[:, JOINT], c @ rows, atol=1e-9)
-
-
-def test_other_columns_are_seen_through_the_gain_that_the_model_has(arm):
-    model = with_gain(arm)
-    run = recorded(arm, arm)
-    more = {'effects.active': ['current_gain', 'coulomb_friction'],
-            'effects.coulomb_friction.swing.force': 2.0}
-    changed = DriveModel.from_parameters({**model.values, **more}, model.source)
-    before, after = (Design.of(one, [run]) for one in (model, changed))
-    rows = before.drive_rows(CoulombFriction, JOINT, {})
-    assert_allclose(after.forces[:, JOINT] - before.forces[:, JOINT], 2.0 * rows[0], atol=1e-9)
 
 
 def test_without_temperature_and_gear_it_is_not_tried(arm):

@@ -16,7 +16,6 @@ import pytest
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SWING, NOISE = 1, 0.02  # [N m]
@@ -56,31 +55,6 @@ def wound_up(model: DriveModel, compliance: float, loss: float = 0.0, second: bo
     effort = forces.total + NOISE * random.normal(size=forces.total.shape)
     return Recording.from_arrays('run', moved.time, read(motor), None, effort, model.drives, {
         'link_position': read(moved.position + 0.01)} if second else {})
-
-
-def test_a_second_encoder_says_where_the_link_is_and_what_it_carries() -> None:
-    random = np.random.default_rng(1)
-    load = 40 * random.normal(size=200)
-    w = COMPLIANCE * load + 0.003  # its zero is another
-    windup = np.zeros((3, 200, 2))
-    windup[:, :, 1] = w, random.normal(size=200), random.normal(size=200)
-    transmitted = np.stack((load, load), axis=1)
-    effect = ElasticJoint({'turn': {'compliance': 1e-3, 'loss': 0.0}, 'swing': {
-        'compliance': COMPLIANCE, 'loss': 0.0}})
-    drives = ('turn', 'swing')
-    by_load = effect.loaded_position_error(drives, transmitted)
-    np.testing.assert_allclose(by_load, transmitted * [1e-3, COMPLIANCE])
-    q, q_dot, q_ddot = effect.windup_error(drives, transmitted, windup)
-    # Of loads that are right there is nothing to add but the accelerations of the wind-up.
-    np.testing.assert_allclose(q, 0.0, atol=1e-12)
-    np.testing.assert_array_equal(q_dot, 0.0)
-    np.testing.assert_allclose(q_ddot[:, 1], windup[2, :, 1])
-    assert not q_ddot[:, 0].any()  # without a second encoder
-    # A load that the model does not know of is felt by the encoder.
-    heavier = windup.copy()
-    heavier[0, 50, 1] += COMPLIANCE * 10
-    q, _, _ = effect.windup_error(drives, transmitted, heavier)
-    assert q[50, 1] == pytest.approx(COMPLIANCE * 10, rel=0.05)
 
 
 def test_an_elastic_joint_is_found_with_its_compliance(tmp_path: Path) -> None:

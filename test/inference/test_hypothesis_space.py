@@ -28,7 +28,9 @@ from pprs_dynamics.inference.search import candidates as candidates_module
 from pprs_dynamics.inference.search import components as components_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
@@ -283,3 +285,19 @@ def test_sets_with_a_nonlinear_effect_are_those_of_the_last_search(
     first, last = (tabulated(number)[0].first for number in (0, 1))
     for row in ModelTable(first, last).rows:
         assert row.fits is (last if 'structure_2' in row.placed_names else first)
+
+
+def test_the_search_ends_at_an_admissible_set() -> None:
+    fits = FittedSets(random_design({('structure_4', None): 1.5}, 1), DECISIONS)
+    fits.form_errors = SimpleNamespace(  # type: ignore[assignment]
+        reason=lambda fitted: 'form' * ('structure_4' in {one.name for one in fitted.effects}))
+    found = Search(fits).run()
+    assert found.is_admissible
+    assert 'structure_4' not in {name for name, _ in sets_of(found)}
+
+
+def test_blocks_are_predicted_worse_than_they_are_fitted() -> None:
+    fits = FittedSets(random_design(TWO, 3), DECISIONS)
+    fitted = fits.evaluate(tuple(everything()[:5]))
+    residual = linear_residual(fits, fitted)
+    assert hold_out(fits, fitted).error > 1.001 * np.sqrt(np.nanmean(residual ** 2))

@@ -28,7 +28,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 MODEL = DriveModel.load('config/single_axis.yaml')
 OWN = 'links.mass', 'friction.viscous', 'friction.coulomb'
 MASS, VISCOUS, COULOMB = (MODEL.values[key][0] for key in OWN)
-TIME = np.arange(0, 20, 0.005)
+TIME = np.arange(0, 8.0, 0.005)
 
 
 def recorded(effort: Array) -> Recording:
@@ -123,6 +123,7 @@ def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     assert clause.startswith('the gain of axis would be beyond 0.5')
 
 
+@pytest.mark.slow
 def test_a_late_effort_is_found_without_an_impossible_gain() -> None:
     """The fourth joint of an iiwa, whose torques are 60 to 70 ms late and its masses guesses."""
     model, recording = shared_case('kuka_lag', 'j4.yaml', 'j4_1_half.csv.gz')

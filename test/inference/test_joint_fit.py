@@ -120,23 +120,6 @@ def test_the_gain_of_a_block_is_the_fall_of_the_deviance_at_the_same_noise() -> 
                                                             abs=1e-4)
 
 
-def test_coefficients_are_the_posterior_mean_and_spread() -> None:
-    rng = np.random.default_rng(2)
-    truth, inside = np.array([0.8, -0.5]), []
-    for _ in range(60):
-        rows = rng.normal(size=(2, 800))
-        error = (truth @ rows + rng.normal(size=800))[:, None]
-        residuals = Residuals(('a',), PERIOD * np.arange(800), np.zeros(800, dtype=int), error,
-                              np.zeros_like(error), {}, {}, PERIOD)
-        regression = Regression(residuals)
-        block = regression.block({0: rows})
-        fit = regression.fit((block,))
-        off = (fit.of(block) - truth) / np.sqrt(np.diag(fit.covariance))
-        inside += list(np.abs(off) < 1.96)
-    # 120 draws: 95 % with a standard error of 2 %.
-    assert 0.88 < np.mean(inside) < 1.0
-
-
 def test_no_step_of_the_fit_of_the_noise_goes_uphill() -> None:
     regression, blocks = made_up(3)
     fit = regression.fit(blocks)

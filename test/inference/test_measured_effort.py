@@ -30,7 +30,7 @@ from pprs_dynamics.inference.readings.efforts import (
     kinds_of,
     looks_like,
 )
-from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 RATE = 200.0  # [Hz]
@@ -194,17 +194,6 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
     motion = arm.motion(DURATION, RATE)
     np.testing.assert_allclose(model.drive_forces(motion).total, run.total - run.gravity,
                                atol=1e-9)
-
-
-def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
-    run = mechanism_run(tmp_path)
-    values = {**run.model.values, 'robot.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
-    model = DriveModel.from_parameters(values, run.model.source)
-    write_recording(tmp_path / 'run.csv', run.of(run.total))
-    read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
-    np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
-    with pytest.raises(ModelError, match='effort_kind'):
-        DriveModel.from_parameters({**DriveModel.load().values, 'effort_kind': 'current'})
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ HIDDEN = {
     'nothing': {},
     'spring': {'drive_spring': {'stiffness': 60.0, 'position': 0.02}},
     'friction': {'coulomb_friction': {'force': 3.0}},
-    'delay': {'time_delay': {'delay': 0.02}},
+    'delay': {'time_delay': {'delay': 0.0173}},
     'two': {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}}
 
 
@@ -77,6 +77,23 @@ def test_the_reported_set_is_the_row_of_least_cost(found: Diagnosis) -> None:
         candidate.name for candidate in table.best.effects}
     assert {name for name, _ in found.sets[0].names} == {
         candidate.name for candidate in table.best.fitted.candidates}
+
+
+@pytest.mark.parametrize('name', ['spring', 'friction', 'delay'])
+def test_values_are_the_hidden_ones_within_their_uncertainty(name: str) -> None:
+    effect, = diagnose(axis({}), [record(HIDDEN[name])]).effects
+    for key, value in HIDDEN[name][effect.name].items():
+        found = effect.parameters[f'{AXIS}.{key}']
+        assert abs(found.value - value) < 4 * found.std < 0.3 * abs(value)
+
+
+def test_friction_has_the_sign_of_friction_and_is_alike_in_both_directions() -> None:
+    table = table_of(diagnose(axis({}), [record(HIDDEN['friction'])]))
+    # The prior has its probability on one side, but for the odds of a wrong sign.
+    assert table.best.terms.signs == pytest.approx(
+        -2 * np.log(2 * (1 - DECISIONS.wrong_sign_odds)), abs=1e-3)
+    assert any('asymmetric_friction may be the form error of friction that is the same' in
+               fitted.barred for fitted in table.barred(1e3))
 
 
 def test_two_effects_that_a_gain_imitates_are_the_reported_ones() -> None:

@@ -8,7 +8,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics.inference.search.candidates import Component, PriorCosts
+from pprs_dynamics.inference.search.candidates import (
+    COURSE_TIMES,
+    DRIFT,
+    DURING,
+    SINCE,
+    Component,
+    Course,
+    PriorCosts,
+)
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -47,3 +55,10 @@ def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> No
     names = tuple(c.name for c in effect.coefficients)
     component = Component(effect, 0 if issubclass(effect, DriveEffect) else None, names)
     assert set(component.signed) == set(effect.unphysical_below)
+
+
+@pytest.mark.parametrize(('kind', 'count'), [
+    (SINCE, COURSE_TIMES), (DURING, COURSE_TIMES ** 2), (DRIFT, 1)])
+def test_all_changes_of_a_kind_share_the_odds_of_a_change(kind: str, count: int) -> None:
+    cost = COSTS.of_course(Course(kind, 1.0, 2.0))
+    assert count * np.exp(-cost / 2) == pytest.approx(DECISIONS.onset_odds)

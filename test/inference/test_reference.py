@@ -138,39 +138,6 @@ def test_what_a_reference_leaves_open_is_no_change(
     assert found.verdict == 'adequate'
 
 
-def test_two_runs_tell_how_far_the_machine_repeats(
-    machine: tuple[DriveModel, Reference],
-) -> None:
-    model, _ = machine
-    first, same = run(model, 0, 1), run(model, 0, 2)
-    moved = arm.motion(20.0, seed=0)
-    other = Recording.from_arrays(
-        'other', same.time, same.position, same.velocity,
-        same.effort - [1.0, 0.0, 0.0] * healthy(moved), same.drives)
-    steady, loose = (Reference.of(model, [first, one]).repeats for one in (same, other))
-    assert np.all(steady > 0.98)
-    assert loose[0] < 0.8
-    assert np.all(loose[1:] > 0.98)
-    # A single one says nothing of another day.
-    assert np.all(Reference.of(model, [first]).repeats <= 0.99)
-
-
-def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
-        machine: tuple[DriveModel, Reference]) -> None:
-    model, _ = machine
-    whole = run(model, 0, 1)
-    effort = whole.effort.copy()
-    effort[:, 2] = np.nan
-    reference = Reference.of(model, [Recording.from_arrays(
-        'two', whole.time, whole.position, whole.velocity, effort, whole.drives)])
-    design = Design.of(model, [run(model, 0, 4)])
-    error = design.residuals.error
-    carried = reference.carried_over(design).shown(design.residuals)
-    left = np.nanstd(error - carried, axis=0) / np.nanstd(error, axis=0)
-    assert max(left[:2]) < 0.35
-    assert 0.8 < left[2] < 1.2
-
-
 def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None:
     model = arm.real_arm(tmp_path)
     for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6))):

@@ -311,7 +311,7 @@ MISTAKES = {
         lambda text: text.replace(',', ';').replace('\n0.01;', '\n0,01;'), 'decimal comma'),
     'a short row': (lambda text: text[:-40], 'row 41 holds 13 cells, but the header 19'),
     'a column twice': (lambda text: text.replace('lift_1/velocity', 'lift_1/position'),
-                       "'lift_1/position' stands twice"),
+                       "2 columns have the name 'lift_1/position'"),
     'no position anywhere': (lambda text: re.sub(r'(?m)^([0-9][^,]*),[^,]*', r'\1,', text),
                              'none of its 40 samples'),
 }

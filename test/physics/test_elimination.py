@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics.physics.mechanism.arithmetic import compiled_solve
-from pprs_dynamics.physics.mechanism.elimination import elimination_order
+from pprs_dynamics.physics.mechanism.closures import elimination_order
 
 SIZE, COLUMNS = 14, 3
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import LimitError, WorkspaceError
 from pprs_dynamics.physics.model.limits import DriveLimits
 
@@ -16,7 +17,7 @@ PAPER = DriveModel.from_parameters({
     **DriveModel.load().values, 'limits.slide_stroke': [-0.3, 0.2],
     'limits.lift_stroke': [-0.1, 0.8], 'limits.effort': [10.0, 20.0, 30.0, 40.0, 50.0, 60.0],
 }).limits
-ARM = DriveLimits(('elbow', 'rail'), ('rad', 'm'), ('N m', 'N'), np.array([-2.0, 0.0]),
+ARM = DriveLimits(('elbow', 'rail'), (DriveUnits(True), DriveUnits()), np.array([-2.0, 0.0]),
                   np.array([1.0, 0.5]), np.array([7.0, 300.0]), ('its range',) * 2, 'the URDF')
 EACH = pytest.mark.parametrize('limits', [PAPER, ARM], ids=['3-PPRS', 'arm'])
 
@@ -48,7 +49,7 @@ def test_the_first_position_outside_its_stroke_is_named(limits: DriveLimits) -> 
             with pytest.raises(WorkspaceError) as caught:
                 limits.check_strokes(bad)
             assert caught.value.sample == 2
-            unit = limits.position_units[drive]
+            unit = limits.units[drive].position
             text = str(caught.value)
             assert f'{name} would have to be at {end[drive] + out:.6g} {unit}' in text
             assert (f'{limits.sources[drive]} is [{lower[drive]:g}, {upper[drive]:g}] {unit}'
@@ -71,7 +72,7 @@ def test_the_first_effort_over_its_limit_is_named(limits: DriveLimits) -> None:
                 limits.check_efforts(bad)
             assert caught.value.sample == 2
             assert name in str(caught.value)
-            assert f'{limits.efforts[drive]:g} {limits.effort_units[drive]}' in str(caught.value)
+            assert f'{limits.efforts[drive]:g} {limits.units[drive].effort}' in str(caught.value)
             assert limits.effort_source in str(caught.value)
 
 

@@ -77,25 +77,6 @@ def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
         mujoco_torques(arm.urdf(), motion, gravity), abs=1e-9)
 
 
-def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
-    model = DriveModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
-    motion = states()
-    rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
-    assert rows @ model.robot.inertial.ravel() == pytest.approx(
-        model.drive_forces(motion).total, abs=1e-9)
-
-
-def test_locked_joints_are_as_those_that_rest(tmp_path: Path) -> None:
-    motion = states()
-    held = JointMotion(*(values * [1, 0, 1] for values in (
-        motion.position, motion.velocity, motion.acceleration)))
-    part = DriveModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
-    found = part.drive_forces(JointMotion(*(values[:, [0, 2]] for values in (
-        held.position, held.velocity, held.acceleration)))).total
-    whole = DriveModel.load(arm.write_arm(tmp_path))
-    assert found == pytest.approx(whole.drive_forces(held).total[:, [0, 2]], abs=1e-9)
-
-
 def test_friction_armature_and_offset_add_up(tmp_path: Path) -> None:
     model = DriveModel.load(arm.write_arm(tmp_path))
     real = arm.real_arm(tmp_path, **{'robot.armature': (1.0, 2.0, 3.0)})

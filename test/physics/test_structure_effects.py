@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from oracles.mujoco_robot import MujocoRobot
-from oracles.pinocchio_robot import PinocchioRobot
 from random_states import (
     ELBOWS,
     model_of,
@@ -108,16 +107,6 @@ def test_changed_bodies_give_the_engines_forces(case, name) -> None:
         motion).force
     assert np.abs(expected).max() > 0.1
     assert_allclose(found, expected, rtol=0, atol=FORCE_TOLERANCE)
-
-
-@pytest.mark.parametrize('engine', [MujocoRobot, PinocchioRobot])
-def test_viscous_friction_of_joints_is_the_engines(case, engine) -> None:
-    robot, motion, state = case
-    for joint, constants in (('revolute', (0.03, 0.0)), ('spherical', (0.0, 0.03))):
-        found = EFFECTS['joint_friction']({f'{joint}.viscous': 0.03}).force(state)
-        oracle = engine(robot).solve(motion, *constants).passive
-        assert np.abs(oracle).max() > 0.05
-        assert_allclose(found, oracle, rtol=0, atol=FORCE_TOLERANCE)
 
 
 # Power of the drives = power into the load ---------------------------------------------------

@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_evaluation
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 
 SAMPLES = 30
@@ -65,8 +64,9 @@ def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize('name', ['hexapod', 'five_bar'])
 def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
-    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01} for one in friction_rows(
-        DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
+    structure = DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure
+    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
+              for one in structure.friction_rows}
     model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
@@ -343,22 +343,6 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
     with pytest.raises(SingularityError):
         model.drive_forces(PlatformMotion.at_rest(np.tile(home.p, (samples, 1)),
                                                   np.tile(turned, (samples, 1))))
-
-
-def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
-    """A counterweight that slides as the drive turns is an inertia and a weight more."""
-    text = robots.RobotText('winch', tool='drum')
-    text.link('base')
-    text.link('drum', 2.0, (0, 0, 0), (0.1, 0.1, 0.1))
-    text.link('weight', 3.0, (0, 0, 0), (1, 1, 1))
-    text.joint('turn', 'revolute', 'base', 'drum', axis=(0, 1, 0))
-    text.joint('slide', 'prismatic', 'base', 'weight', axis=(0, 0, 1),
-               more='\n    <mimic joint="turn" multiplier="-0.2" offset="0.5"/>')
-    text.drives = ['turn']
-    model = DriveModel.load(text.write(tmp_path))
-    q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
-    expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
-    assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
 
 
 def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own(

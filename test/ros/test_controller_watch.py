@@ -70,6 +70,13 @@ def test_one_that_stands_is_told_within_two_seconds_and_recovers() -> None:
     assert cell.run(2.0, cell.path)[-1] == ''
 
 
+def test_one_that_strays_for_a_moment_is_not_complained_of() -> None:
+    cell = Cell()
+    cell.run(2.0, cell.path)
+    assert set(cell.run(0.4, lambda t: [0.3, 0.3])) == {''}
+    assert set(cell.run(2.0, cell.path)) == {''}
+
+
 @pytest.mark.parametrize(('given', 'reason'), [
     ({'left': 0.01}, 'end 10 ms after they are sent'),
     ({'left': -0.01}, 'ended 10 ms before they are sent'),

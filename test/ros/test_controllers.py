@@ -25,9 +25,6 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.conversions import RobotNames
-from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
@@ -270,26 +267,3 @@ def controller(action: Any, ending: str = 'succeed', share: float = 1.0) -> Any:
             server.destroy()
 
     return running()
-
-
-def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
-    model = DriveModel.from_parameters({
-        **DriveModel.load().values, 'joint_prefix': 'left_', 'joint_map.lift_3': 'z_axis'})
-    names = RobotNames.of(model, 'left_base')
-    motion = HelicalPath().motion(np.array([1.0]))
-    for frame, accepted in (('left_base', True), ('', True), ('base', False)):
-        message = conversions.write_trajectory(motion, conversions.time(NOW), [0], frame)
-        read = readers_for(model, names)[TRAJECTORY].read
-        if not accepted:
-            with pytest.raises(Rejection, match='left_base'):
-                read(serialize_message(message), NOW, 'reject')
-            continue
-        request = read(serialize_message(message), NOW, 'reject')
-    answer = Feedforward(model, OWN).answer(request)
-    state = conversions.joint_state(NOW, answer.effort[0], names=names)
-    assert list(state.name) == ['left_slide_1', 'left_slide_2', 'left_slide_3', 'left_lift_1',
-                                'left_lift_2', 'z_axis']
-    assert state.header.frame_id == 'left_base'
-    measured = conversions.joint_state(NOW, answer.effort[0], np.arange(6.0), np.zeros(6), names)
-    [found] = MeasuredStates(names.joints).read(serialize_message(measured))
-    assert found.position.tolist() == list(range(6))

@@ -92,15 +92,16 @@ def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
         node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
 
 
-def test_what_is_gone_over_stays_within_the_limits() -> None:
+@pytest.mark.parametrize(('before', 'after'), [(MODEL, HEAVY), (HEAVY, MODEL)])
+def test_what_is_gone_over_stays_within_the_limits(before: DriveModel, after: DriveModel) -> None:
+    """Also where the model that comes would be within them by itself."""
     asked = request()
-    forces = MODEL.drive_forces(asked.motion).total[0]
-    limit = (np.abs(forces) * 1.01).tolist()
+    limit = (np.abs(MODEL.drive_forces(asked.motion).total[0]) * 1.01).tolist()
     own = {**OWN, 'ramp_time': 2.0, 'limit_policy': 'clamp'}
     clock = Clock()
-    node = Feedforward(MODEL, own, clock)
+    node = Feedforward(before, own, clock)
     node.answer(asked)
-    node.use(HEAVY, {**own, 'effort_limits': limit})
+    node.use(after, {**own, 'effort_limits': limit})
     clock.now += 1.0
     assert (np.abs(node.answer(asked).effort[0]) <= limit).all()
 
@@ -161,9 +162,19 @@ def test_of_a_piece_the_first_point_is_remembered_and_what_is_foreseen_is_not() 
 def test_drives_are_held_where_they_are_with_their_gravity(moment: float) -> None:
     motion = HelicalPath().motion([moment])
     pose = MODEL.drive_forces(motion.held())
-    found = Feedforward(MODEL, OWN).hold_at(pose.mechanism.position[0])
-    np.testing.assert_allclose(found.effort[0], pose.total[0], atol=1e-8)
+    found = Feedforward(MODEL, {**OWN, 'feedforward_scale': 0.5}).hold_at(
+        pose.mechanism.position[0])
+    np.testing.assert_allclose(found.effort[0], 0.5 * pose.total[0], atol=1e-8)
     np.testing.assert_allclose(found.forces.mechanism.position, pose.mechanism.position, atol=1e-9)
+
+
+def test_a_path_has_come_to_rest_at_its_end_and_not_where_it_breaks_off() -> None:
+    node = Feedforward(MODEL, OWN)
+    assert not node.has_come_to_rest
+    for last, rests in ((1.0, False), (HelicalPath.duration, True)):
+        motion = HelicalPath().motion(np.linspace(last - 0.1, last, 11))
+        node.answer(TrajectoryRequest(motion, 0, STEP * np.arange(11)))
+        assert node.has_come_to_rest is rests
 
 
 def test_a_clock_that_is_set_back_multiplies_no_effect() -> None:

@@ -15,7 +15,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
-TIME = np.arange(6000) * 0.002
+TIME = np.arange(0, 8.0, 0.005)
 EXCITATION = Excitation()
 
 

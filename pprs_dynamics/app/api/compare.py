@@ -12,16 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.diagnosis.comparison import Comparison
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
@@ -41,12 +45,15 @@ class ComparisonResult(Result):
         The numbers.
     notes : tuple of str
         How it was computed.
+    beside : Beside, optional
+        Errors of another model on the same recordings.
     """
 
     inputs: Inputs
     residuals: Residuals
     comparison: Comparison
     notes: tuple[str, ...]
+    beside: Beside | None = None
 
     @property
     def rms(self) -> float:
@@ -65,22 +72,23 @@ class ComparisonResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
-        return {**self.comparison.to_dict(), 'verdict': self.verdict,
-                'effort_looks_like': effort_looks_like(
-                    recording.findings for recording in self.inputs.fitted)}
+        content = {**self.comparison.to_dict(), 'verdict': self.verdict,
+                   'effort_looks_like': effort_looks_like(
+                       recording.findings for recording in self.inputs.fitted)}
+        return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
         from pprs_dynamics.app.report.comparison_report import comparison_view
 
-        return comparison_view(self.comparison, self._next, details)
+        return comparison_view(self.comparison, self._next, details, self.beside)
 
     def page(self) -> Page:
         """Return the page of `pprs compare --report`."""
         from pprs_dynamics.app.report.comparison_report import comparison_page
 
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
-                               self.comparison, self.notes, self._next)
+                               self.comparison, self.notes, self._next, self.beside)
 
     def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> None:
         """Write measured effort, model, parts and residual as a bag, .mcap or .db3.
@@ -132,7 +140,8 @@ class ComparisonResult(Result):
 
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
-            progress: Progress | None = None, as_it_is: bool = False) -> ComparisonResult:
+            beside: str | PathLike[str] | None = None, progress: Progress | None = None,
+            as_it_is: bool = False) -> ComparisonResult:
     """Hold a model against recordings: how wrong it is, on which drive, in which situations.
 
     Parameters
@@ -142,6 +151,8 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         A path is read, and its units and signs are checked; a Recording is not checked.
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
+    beside : path, optional
+        Another model file, compared with the same recordings.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     as_it_is : bool
@@ -171,5 +182,16 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         residuals, where,
         noise_floors(columns, residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
-    return ComparisonResult(inputs, residuals, comparison, tuple(notes))
+    return ComparisonResult(
+        inputs, residuals, comparison, tuple(notes),
+        None if beside is None else _beside(inputs, Path(beside)))
 
+
+def _beside(inputs: Inputs, path: Path) -> Beside:
+    """Return the errors of another model on the same recordings."""
+    other = DriveModel.load(path)
+    if other.drives != inputs.model.drives:
+        raise ModelError('--beside', displayed(path), 'have the drives of the model: '
+                         f'{", ".join(inputs.model.drives)}')
+    residuals, _ = measure_residuals(other, inputs.fitted)
+    return Beside(displayed(path.name), rms_by_drive(residuals), rms(residuals))

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -36,8 +36,7 @@ from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.measurement.files.samples import Series
-from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE, read_column
+from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 from pprs_dynamics.measurement.files.way_out import common_prefix
 from pprs_dynamics.physics.mechanism.branches import (
     Branch,
@@ -413,7 +412,6 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
                     movable: Sequence[str]) -> Guess:
     """Return which columns are what in files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
-    inside.update(_in_turn(files, inside, len(drives)))
     guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
                for kind, file in inside.items() if kind != FILE_TIME}
     merged = replace(
@@ -443,20 +441,6 @@ def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
             star = f'{stem}*'
         found[kind] = star + file.name.removeprefix(stem)
     return found
-
-
-def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: int,
-             ) -> Iterator[tuple[str, Contents]]:
-    """Yield what is in files of one column that hold the joints' numbers in turn."""
-    if FILE_TIME not in files or count < 2:
-        return
-    times = len(read_column(files[FILE_TIME]))
-    for kind, file in inside.items():
-        if kind != FILE_TIME and len(file.series) == 1 and not file.has_header:
-            values = read_column(files[kind])
-            if len(values) == count * times:
-                yield kind, replace(file, series=tuple(
-                    Series(f'1[{k}]', f'{kind} {k}', values[k::count]) for k in range(count)))
 
 
 # -------------------------------------------------------------------------------------- text

@@ -37,7 +37,7 @@ class SimulationResult(Result):
     recording : Recording
         What the sensors said.
     effects : tuple of dict
-        What was hidden: name, drives, parameters and form of each effect.
+        What was hidden: name, drives and parameters of each effect.
     motion : PlatformMotion or JointMotion
         Where the robot was meant to go.
     rate : float

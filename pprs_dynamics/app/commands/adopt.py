@@ -53,5 +53,5 @@ def run(options: argparse.Namespace) -> int:
     tell(result, options, screen, lambda: result.page(options.output))
     if not result.adopted:
         return 1
-    screen.print(f'model: {shown(options.output)}')
+    screen.print(f'model: {shown(options.output)}', soft_wrap=True)
     return 0

@@ -22,6 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states')
+    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
+                        'errors on the same recordings')
     arguments.add_report(parser)
 
 
@@ -30,10 +32,11 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     inputs = read_inputs(options, screen, whole=True)
     with staged_bar(screen) as progress:
-        result = compare(inputs.model, inputs, topic=options.topic, progress=progress)
+        result = compare(inputs.model, inputs, topic=options.topic, beside=options.beside,
+                         progress=progress)
     tell(result, options, screen)
     if options.mcap:
         with staged_bar(screen) as progress:
             result.write_bag(options.mcap, progress)
-        screen.print(f'bag: {shown(options.mcap)}')
+        screen.print(f'bag: {shown(options.mcap)}', soft_wrap=True)
     return 0

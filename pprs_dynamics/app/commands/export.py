@@ -42,24 +42,23 @@ def run(options: argparse.Namespace) -> int:
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
-    found = replay(model, expressed, robot, text, options.to)
+    found = replay(model, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
         write_json(options.json, {'format': options.to, 'output': options.output,
                                   'not_expressed': list(expressed.not_expressed),
                                   **found.to_dict()})
     _say(screen, found, expressed.not_expressed)
-    screen.print(f'{options.to}: {shown(options.output)}')
+    screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0
 
 
 def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
+    screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
-        ('drive', 'effort', 'error', 'expected'),
+        ('drive', 'effort', 'error'),
         [(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
          for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
-                                         found.expected, strict=True)],
-        title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
-        title_justify='left'))
+                                         strict=True)]))
     more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
     screen.print(f'not expressed: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

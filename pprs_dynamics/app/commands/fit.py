@@ -33,5 +33,5 @@ def run(options: argparse.Namespace) -> int:
         result = fit(inputs.model, inputs, progress=progress)
     result.save(options.output)
     tell(result, options, screen)
-    screen.print(f'model: {shown(options.output)}')
+    screen.print(f'model: {shown(options.output)}', soft_wrap=True)
     return 0

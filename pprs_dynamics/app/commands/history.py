@@ -50,9 +50,9 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, {'steps': [step.to_dict() for step in steps]})
     if options.report:
         page = history_page(Path(options.file).name, steps, unit)
-        screen.print(f'page: {shown(page.write(options.report))}')
+        screen.print(f'page: {shown(page.write(options.report))}', soft_wrap=True)
     if options.undo:
         values, step = without_last_step(model.values)
         write_model(options.output, values, base)
-        screen.print(f'{step.effect} removed: {shown(options.output)}')
+        screen.print(f'{step.effect} removed: {shown(options.output)}', soft_wrap=True)
     return 0

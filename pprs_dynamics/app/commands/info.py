@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     recordings, summaries = show_recordings(model, options.recordings, options.topic, screen)
     if options.report:
         recording_page(recordings[0], model.units).write(options.report)
-        screen.print(f'page: {shown(options.report)}')
+        screen.print(f'page: {shown(options.report)}', soft_wrap=True)
     if options.json:
         write_json(options.json, {
             **content,

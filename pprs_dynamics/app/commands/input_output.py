@@ -79,4 +79,4 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
     # Last: a reader of the text that goes away, as `head` does, ends the command.
     screen.print(result.view(details=getattr(options, 'details', False)) if view is None else view)
     if getattr(options, 'report', None):
-        screen.print(f'page: {shown(options.report)}')
+        screen.print(f'page: {shown(options.report)}', soft_wrap=True)

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
             path_seed=options.path_seed, noise=options.noise, progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
-    screen.print(f'recording: {shown(options.output)}')
+    screen.print(f'recording: {shown(options.output)}', soft_wrap=True)
     return 0
 
 

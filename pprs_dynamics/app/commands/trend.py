@@ -32,5 +32,5 @@ def run(options: argparse.Namespace) -> int:
     if options.report:
         from pprs_dynamics.app.report.fleet_page import fleet_page
 
-        screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}')
+        screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}', soft_wrap=True)
     return 0

@@ -11,7 +11,7 @@ from typing import Any
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
-from pprs_dynamics.inference.diagnosis.comparison import Comparison
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
@@ -24,19 +24,18 @@ EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 def drives_table(comparison: Comparison) -> PlainTable:
     """Return the numbers of every drive; the page shows all of them, the terminal the first."""
-    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')
+    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise')
     return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name
                        for name in headings)), [
         (name, plain(drive.rms), percent(drive.relative),
          rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
          percent(drive.explained_variance),
-         '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
-         f'{drive.effective_samples:.0f} of {drive.samples}')
+         '' if drive.noise_floor is None else plain(drive.noise_floor, 2))
         for name, drive in comparison.drives.items()]
 
 
 def comparison_view(comparison: Comparison, following: tuple[str, str], details: bool = False,
-                    ) -> Any:
+                    beside: Beside | None = None) -> Any:
     """Return how wrong the model is, where, and what to do next.
 
     Parameters
@@ -46,6 +45,7 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
         What to do next, in words and for a shell.
     details : bool
         Everything, instead of at most 25 lines of 80 columns.
+    beside : Beside, optional
     """
     lines = [f'{number}. {statement.text}'
              for number, statement in enumerate(comparison.where, start=1)]
@@ -60,7 +60,20 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
     if comparison.is_beyond_noise:
         words, command = following
         parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]
+    if beside is not None:
+        parts.append(_beside_table(comparison, beside))
     return stacked(*parts)
+
+
+def _beside_table(comparison: Comparison, beside: Beside) -> Any:
+    rows = [*((name, drive.rms, beside.drives.get(name))
+              for name, drive in comparison.drives.items()),
+            ('all', comparison.rms, beside.rms)]
+    return text_table(
+        ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'),
+        [(escape(name), plain(before), 'none' if after is None else plain(after),
+          '' if not after or not before else f'{100 * (after / before - 1):+.0f}%')
+         for name, before, after in rows], frame='none')
 
 
 def _drives_table(comparison: Comparison) -> Any:
@@ -70,14 +83,15 @@ def _drives_table(comparison: Comparison) -> Any:
     short = len(comparison.unit) > 1
     return text_table(
         [heading.partition(' [')[0] if short and not heading.startswith('rms') else heading
-         for heading in headings[:7]],
-        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
+         for heading in headings],
+        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:])
          for row, drive in zip(rows, comparison.drives.values(), strict=True)], frame='none')
 
 
 def comparison_page(
     model: DriveModel, recordings: Sequence[Recording], residuals: Residuals,
     comparison: Comparison, notes: Sequence[str], following: tuple[str, str] = ('', ''),
+    beside: Beside | None = None,
 ) -> Page:
     """Return the page of one comparison: where it fails on one screen, the rest to be unfolded.
 
@@ -92,6 +106,8 @@ def comparison_page(
         How it was computed.
     following : (str, str), optional
         What to do next, in words and for a shell.
+    beside : Beside, optional
+        Drawn as what the error becomes.
     """
     page = Page('Model against measurement')
     page.text(sentence(comparison.verdict), 'lead')
@@ -99,9 +115,11 @@ def comparison_page(
     statements = comparison.where
     with page.columns():
         with page.block():
-            page.errors([ErrorRow(name, drive.rms, None, drive.noise_floor)
+            page.errors([ErrorRow(name, drive.rms, beside.drives.get(name) if beside else None,
+                                  drive.noise_floor)
                          for name, drive in comparison.drives.items()],
-                        f'Error, rms [{comparison.unit}]; dotted: the noise.')
+                        f'Error, rms [{comparison.unit}]; dotted: the noise.'
+                        + (f' Second bar: {beside.name}.' if beside else ''))
             if statements:
                 page.bullets([statement.text for statement in statements[:FIRST]], numbered=True)
             else:

@@ -130,7 +130,8 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield from _finding(number, finding)
     for title, note, headings, rows in _tables(diagnosis):
-        yield titled_table(title, (headings, rows), right=(), caption=note)
+        yield titled_table(title, (headings, rows), right=())
+        yield f'[dim]{escape(note)}[/]'
     for title, lines, colour in _lists(words):
         yield f'[bold {colour}]{title}[/]'
         yield from (_labelled([('-', line)], 1) for line in lines)
@@ -205,7 +206,7 @@ def _finding(number: int, finding: Finding) -> Iterator[Any]:
 
 
 def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
-    """Return lines of text beside their labels."""
+    """Return lines of text, each after its label."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 1))

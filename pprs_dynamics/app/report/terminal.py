@@ -36,8 +36,7 @@ def console(**options: Any) -> Any:
             return super().render_str(plain, *args, **options)
 
         def print(self, *objects: Any, **options: Any) -> None:
-            # Names of files stay whole, so that they can be copied.
-            super().print(*objects, **{'overflow': 'ignore', 'crop': False, **options})
+            super().print(*objects, **{'crop': False, **options})  # as of `shell_command`
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)

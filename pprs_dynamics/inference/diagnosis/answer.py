@@ -30,6 +30,7 @@ from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
     CandidateSet,
+    CostTerms,
     EffectCandidate,
     UnknownCandidate,
 )
@@ -153,7 +154,8 @@ class Answer:
         first = table.first.design
         return Diagnosis(
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
-            self._sets(), self._barred(), tuple(moved),
+            tuple(self._ranked_set(row.fitted, row.terms) for row in table.rows[:MOST_SETS]),
+            self._barred(), tuple(moved),
             find_cautions(table.last, table.reported, effects), first.notes, first.given,
             self.adopted, self.given, self.remaining, self.noise, self.noise_levels,
             root_mean_square(list(self.noise_levels.values())), refit, above, little, self.unseen,
@@ -185,7 +187,7 @@ class Answer:
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
             gain, self._objection(candidate, less / max(with_force, 1e-300), gain),
-            self._ranked_set(without), self._in_model(candidate, parameters),
+            self._ranked_set(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
@@ -206,22 +208,6 @@ class Answer:
         if gain.losing and gain.certainty < self.decisions.sure:
             return f'held-out data of {listed(gain.losing)} are predicted worse with it'
         return ''
-
-    @property
-    def raises_the_error(self) -> bool:
-        """Whether the error with the reported effects is larger, over all drives or on one."""
-        if not self.row.effects:
-            return False
-        rise, ratio = 1 + self.decisions.error_rise, self.decisions.left_ratio
-        if self.over_noise(self.remaining) > rise * self.over_noise(self.given.error):
-            return True
-        for d, name in enumerate(self.drives):
-            before, after = (root_mean_square(error[:, d])
-                             for error in (self.given.error, self.remaining))
-            # A drive with too few samples for a fit has no noise floor.
-            if after > max(rise * before, ratio * self.noise_levels.get(name, before)):
-                return True
-        return False
 
     def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
         """Return held-out errors without and with an effect, and its gain where it is known."""
@@ -267,31 +253,23 @@ class Answer:
 
     # Residual
 
-    @cached_property
-    def _form_error(self) -> list[float]:
-        """Form error of the idealised effects of the row, by drive, rms [N].
-
-        A share of the sum of their forces: two forces that cancel are no force of a machine.
-        """
-        force = np.zeros(self.remaining.shape)
-        for candidate in self.fitted.effects:
-            if candidate.effect.idealised:
-                force += self.force(candidate)
-        return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
-
     @outside_cost('a residual above hypot(1.5 noise, form error), or 5 times the noise: `unknown`')
     def _above_noise(self) -> dict[str, float]:
         """Return the drives with more residual than noise and forms explain, over the noise.
 
         Every fit takes widths of reversal as unknown, so that they are part of the explanation.
+        The form error is a share of the sum of forces: two that cancel are no force of a machine.
         """
         found, residual = {}, self.remaining - reversal_forces(self.fits, self.fitted)
+        forms = sum((self.force(candidate) for candidate in self.fitted.effects
+                     if candidate.effect.idealised), np.zeros_like(residual))
         for d in self.fits.regression.drives:
             floor = max(self.noise_levels[self.drives[d]], 1e-300)
+            form = self.decisions.form_share * root_mean_square(forms[:, d]) / floor
+            allowed = min(float(np.hypot(self.decisions.left_ratio, form)),
+                          self.decisions.most_left)
             # A constant may be slow noise.
             ratio = float(np.nanstd(residual[:, d])) / floor
-            allowed = min(float(np.hypot(self.decisions.left_ratio, self._form_error[d] / floor)),
-                          self.decisions.most_left)
             effort = float(np.nanstd(self.given.measured[:, d]))
             if ratio > allowed and ratio * floor > self.decisions.negligible * effort:
                 found[self.drives[d]] = ratio
@@ -300,39 +278,35 @@ class Answer:
     @outside_cost('an effect that ends is no property of the machine: `unknown`')
     def _passing(self) -> Iterator[Statement]:
         """Yield a statement for each drive on which something is there for a stretch alone."""
-        residuals = self.table.first.design.residuals
-        begun = self.table.first.design.reconstructions[0].start
-        for candidate in self.fitted.effects:
-            course = candidate.course
-            if course is None or course.kind != DURING:
-                continue
-            force = self.force(candidate)
-            span = (course.begin - begun, course.end - begun)
+        residuals, first = self.given, self.table.first.design.reconstructions[0].start
+        passing = [(candidate, candidate.course) for candidate in self.fitted.effects
+                   if candidate.course is not None and candidate.course.kind == DURING]
+        for candidate, course in passing:
+            force, evidence = self.force(candidate), self._evidence(candidate)
+            begin, end = course.begin - first, course.end - first
             inside = (residuals.time >= course.begin) & (residuals.time < course.end)
-            evidence = (self.fits.evaluate(self.fitted.without(candidate)).total
-                        - self.fitted.total)
             for d in np.flatnonzero(np.any(force, axis=0)):
-                squares = np.square(residuals.error[:, d])
-                share = float(np.nansum(squares[inside]) / np.nansum(squares))
+                drive, squares = self.drives[d], np.square(residuals.error[:, d])
                 size = root_mean_square(force[inside, d])
                 yield Statement(
-                    self.drives[d], 'time', span, share, float(np.mean(inside)),
-                    f'{self.drives[d]}: from {span[0]:.4g} s to {span[1]:.4g} s alone its error is '
-                    f'another, {plain(size)} {residuals.units_of(self.drives[d]).effort} rms, as '
-                    f'of a contact, a stop or a hand ({candidate.name} would explain it): what '
-                    'passes is no property of the machine',
-                    evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
+                    drive, 'time', (begin, end),
+                    float(np.nansum(squares[inside]) / np.nansum(squares)), float(np.mean(inside)),
+                    f'{drive}: its error changes from {begin:.4g} s to {end:.4g} s alone, by '
+                    f'{plain(size)} {residuals.units_of(drive).effort} rms, as of a contact, a '
+                    f'stop or a hand ({candidate.name} explains it): it is no property of the '
+                    'machine', evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
+
+    def _evidence(self, candidate: EffectCandidate | UnknownCandidate) -> float:
+        """Return by how much the set of the row costs more without a candidate."""
+        return self.fits.evaluate(self.fitted.without(candidate)).total - self.fitted.total
 
     def _depends_on(self) -> tuple[Statement, ...]:
         """Return patterns of no catalogue."""
-        statements = []
         by_drive = {pattern.d: pattern for pattern in self.table.patterns}
-        for candidate in self.fitted.unknowns:
-            evidence = (self.fits.evaluate(self.fitted.without(candidate)).total
-                        - self.fitted.total)
-            for d, block in candidate.parts.items():
-                statements.append(word_statement(
-                    by_drive[d], candidate, self.fitted.fit.of(block), evidence))
+        statements = [
+            word_statement(by_drive[d], candidate, self.fitted.fit.of(block),
+                           self._evidence(candidate))
+            for candidate in self.fitted.unknowns for d, block in candidate.parts.items()]
         return tuple(sorted(statements, key=lambda statement: -statement.evidence))
 
     # Queries on the table
@@ -350,34 +324,28 @@ class Answer:
         """Return the effects that were fitted as the only one, the best first."""
         first = self.table.first
         none = first.evaluate(()).cost
-        return tuple(self._ranked(first, fitted, fitted.effects[0], none - fitted.cost)
+        return tuple(self._ranked(Row(first, fitted), fitted.effects[0], none - fitted.cost)
                      for fitted in self.table.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects nearly worth their prior cost in addition to the reported ones."""
-        return tuple(
-            self._ranked(row.fits, row.fitted, candidate, self.table.best.cost - row.cost)
-            for candidate, row in self.table.suspects(self.decisions.suspect_margin))
+        return tuple(self._ranked(row, candidate, self.table.best.cost - row.cost)
+                     for candidate, row in self.table.suspects(self.decisions.suspect_margin))
 
-    def _ranked(self, fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
-                evidence: float) -> RankedEffect:
+    def _ranked(self, row: Row, candidate: EffectCandidate, evidence: float) -> RankedEffect:
         return RankedEffect(candidate.name, self.design.named(candidate.drives), evidence,
-                            linear_error(fits, fitted))
+                            linear_error(row.fits, row.fitted))
 
-    def _sets(self) -> tuple[RankedSet, ...]:
-        return tuple(map(self._ranked_set, self.table.rows[:MOST_SETS]))
-
-    def _ranked_set(self, row: Row) -> RankedSet:
-        names = tuple((c.name, self.design.named(c.drives)) for c in row.fitted.candidates)
-        return RankedSet(names, row.terms - self.table.best.terms)
+    def _ranked_set(self, fitted: CandidateSet, terms: CostTerms) -> RankedSet:
+        names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
+        return RankedSet(names, terms - self.table.best.terms, fitted.barred)
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return inadmissible sets that would be rivals or better, the cheapest of each names."""
         found: dict[frozenset[str], RankedSet] = {}
         for fitted in self.table.barred(self.decisions.rival_margin):
-            names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
-            found.setdefault(frozenset(name for name, _ in names), RankedSet(
-                names, fitted.terms - self.table.best.terms, fitted.barred))
+            found.setdefault(frozenset(candidate.name for candidate in fitted.candidates),
+                             self._ranked_set(fitted, fitted.terms))
         return tuple(found.values())[:MOST_BARRED]
 
 
@@ -397,16 +365,13 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decis
     return answer.diagnosis(tuple(unconfirmed))
 
 
-@outside_cost('an effect that raises the error of a drive, on the recordings or held out, is not '
-              'confirmed: `unknown`')
+@outside_cost('an effect that raises the error, on the recordings or held out, is not confirmed: '
+              '`unknown`')
 def unconfirmed_effects(answer: Answer) -> list[FoundEffect]:
     """Return the effects of a row that data do not confirm, with the reason.
 
-    Where one is impossible, or the error rises with all of them together, none is confirmed.
+    Where one of them is impossible, none is confirmed.
     """
-    if answer.raises_the_error:
-        return [replace(effect, objection='the error with the reported effects is larger than '
-                        'without') for effect in answer.effects]
     objected = [effect for effect in answer.effects if effect.objection]
     impossible = [effect.name for effect in objected if not effect.is_only_refuted]
     if not impossible:

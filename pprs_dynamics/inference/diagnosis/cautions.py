@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Warnings that qualify an answer: length, motion, filtering, excitation, bounds."""
+"""Warnings that qualify an answer: length, motion, filtering, excitation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
-from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet, Component
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -24,9 +24,8 @@ def find_cautions(
     fits: FittedSets, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
-            *_filtered(fits), *_second_encoders(fits, effects),
-            *_unexcited(fits, best), *_bounds(effects), *_one_load(fits, effects))
+    return (*fits.design.given.faults, *_length(fits, best), *_motion(fits), *_filtered(fits),
+            *_second_encoders(fits, effects), *_unexcited(fits, best), *_one_load(fits, effects))
 
 
 def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
@@ -115,21 +114,6 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
         yield f'this motion hardly excites {listed(weak)}: no statement about them is possible'
 
 
-def _courses(effects: Sequence[FoundEffect]) -> Iterator[str]:
-    for effect in effects:
-        if effect.course is not None:
-            yield f'{effect.name} is there{effect.when}: ' + (
-                'adopt needs a recording that begins after that' if effect.course.kind == SINCE
-                else 'warm the machine up and look for a part that slips')
-
-
-def _bounds(effects: Sequence[FoundEffect]) -> Iterator[str]:
-    for effect in effects:
-        if effect.at_bound:
-            yield (f'{effect.name}: {listed(effect.at_bound)} is at the limit of the values that '
-                   'were tried; do not rely on it')
-
-
 def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
     """Yield friction by load that hardly differs from friction that does not follow the load."""
     share = fits.decisions.one_load
@@ -137,6 +121,7 @@ def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
         other = catalogue().get(effect.effect.at_one_load)
         if other is None or not issubclass(other, DriveEffect):
             continue
+        alike = []
         for name in effect.drives or ():
             d = fits.design.drives.index(name)
             rows = np.concatenate([fits.components.term(Component.of(
@@ -145,5 +130,7 @@ def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
             wanted, columns = effect.force[moving, d], rows[:, moving]
             rest = wanted - np.linalg.lstsq(columns.T, wanted, rcond=None)[0] @ columns
             if root_mean_square(rest) < share * root_mean_square(wanted):
-                yield (f'{effect.name} on {name} and {other.name} differ by less than {share:.0%}, '
-                       'because the load hardly varies. Record another load')
+                alike.append(name)
+        if alike:
+            yield (f'{effect.name} and {other.name} on {listed(alike)} differ by less than '
+                   f'{share:.0%}, because the load hardly varies. Record another load')

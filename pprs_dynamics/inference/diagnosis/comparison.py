@@ -40,12 +40,8 @@ class DriveComparison:
         1 - var(residual) / var(effort); NaN where the effort is constant.
     samples : int
         Measured ones.
-    effective_samples : float
-        Independent samples whose mean would be as uncertain.
     noise_floor : float or None
         rms of the noise [N]; None where it is not known. See `search.noise_floors`.
-    smallest_part : float
-        rms of the smallest part of the model, its mean removed [N].
     unit : str
         Of the drive's efforts.
     pattern : float
@@ -62,9 +58,7 @@ class DriveComparison:
     relative: float
     explained_variance: float
     samples: int
-    effective_samples: float
     noise_floor: float | None
-    smallest_part: float
     unit: str
     pattern: float
     is_little: bool = False
@@ -86,8 +80,7 @@ class DriveComparison:
             return 'noise'
         if np.isnan(self.relative) or self.unexplained > DECISIONS.poor * self.effort:
             return 'poor'
-        is_small = self.unexplained <= min(DECISIONS.good * self.effort, self.smallest_part)
-        return 'good' if is_small else 'fair'
+        return 'good' if self.unexplained <= DECISIONS.good * self.effort else 'fair'
 
     @property
     def verdict(self) -> str:
@@ -104,6 +97,31 @@ class DriveComparison:
                  f'{in_unit(self.noise_floor, self.unit)} of it is noise and '
                  f'{in_unit(self.unexplained, self.unit)} unexplained')
         return f'{error}; {noise}: {self.grade}'
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Errors of another model on the same recordings.
+
+    Parameters
+    ----------
+    name : str
+        Of its file.
+    drives : mapping of str to float
+        Root of the mean squared error of each drive [N or N m].
+    rms : float
+        The same over all drives.
+    """
+
+    name: str
+    drives: Mapping[str, float]
+    rms: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name and errors."""
+        return {'name': self.name, 'drives': {name: {'rms': finite(value)}
+                                              for name, value in self.drives.items()},
+                'overall': {'rms': finite(self.rms)}}
 
 
 @dataclass(frozen=True)
@@ -224,11 +242,7 @@ def _compare_drive(
         # What no pattern explains is an upper bound of the noise.
         floor = noise_at_most(floor, noise.rms)
     most = max((statement.mean_square for statement in findings.statements), default=0.0)
-    parts = [root_mean_square(part[known, index] - part[known, index].mean())
-             for part in residuals.parts.values()]
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
-        float('nan') if np.isnan(share) else rms / swing, share, len(error),
-        float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
-        min((size for size in parts if size > 0), default=np.inf),
+        float('nan') if np.isnan(share) else rms / swing, share, len(error), floor,
         residuals.units_of(name).effort, float(np.sqrt(most)), is_little)

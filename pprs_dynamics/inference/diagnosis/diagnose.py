@@ -12,7 +12,6 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.mounting import other_mounting
-from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.efforts import looks_like
 from pprs_dynamics.inference.readings.findings import NoMeasurement
@@ -60,10 +59,8 @@ def diagnose(
     if other or sticking:
         table = input_model_alone(model, recordings, decisions, report)
         bare = Answer(table, table.best, validate, decisions).diagnosis()
-        return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
-                       stick_slip=sticking, depends_on=tuple(
-                           word_stick_slip(drive, slip, bare.residuals)
-                           for drive, slip in sticking.items()))
+        return replace(bare, verdict='unknown', warnings=(), depends_on=(),
+                       effort_looks_like=other, stick_slip=sticking)
     table = tabulate(model, recordings, decisions, lambda share: report(0.9 * share),
                      None if reference is None else reference.carried_over)
     since = None if reference is None else SinceReference.of(reference, table.first.design)

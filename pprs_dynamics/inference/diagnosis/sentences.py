@@ -38,7 +38,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_of,
     place_on,
 )
-from pprs_dynamics.inference.search.candidates import SINCE, CostTerms
+from pprs_dynamics.inference.search.candidates import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -222,22 +222,14 @@ def _cost(ranked: RankedSet) -> str:
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, and its cost; '' for none.
+    """Return the best set that differs from the reported one, and its cost; '' for none.
 
     A set that lacks a reported effect comes before a set that has one more.
     """
     best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
     others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
-    second = next((ranked for ranked in others if best - set(ranked.names)),
-                  others[0] if others else None)
-    if second is None:
-        return ''
-    gone, new = (listed([_placed(diagnosis, *name) for name in of.names
-                         if name not in other.names])
-                 for of, other in ((diagnosis.sets[0], second), (second, diagnosis.sets[0])))
-    words = (f'{new} instead of {gone}' if new and gone else f'{new} as well' if new
-             else f'without {gone}')
-    return f'{words}: {_cost(second)}'
+    others.sort(key=lambda ranked: best <= set(ranked.names))
+    return f'{_set(diagnosis, others[0])}: {_cost(others[0])}' if others else ''
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:
@@ -264,48 +256,39 @@ def _headline(diagnosis: Diagnosis) -> str:
         what = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
         return f'{" ".join(map(sentence, what))} No effect is reported.'
     if diagnosis.stick_slip:
-        drives = [f'{drive} at {slip.frequency:.2g} Hz'
-                  for drive, slip in diagnosis.stick_slip.items()]
-        return (f'Stick-slip on {listed(drives)}. No missing effect can be identified in such a '
-                'motion.')
-    residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
-    is_noise = residual <= AT_NOISE * diagnosis.noise_floor
-    fall = '' if not effects else (
-        f'With {"it" if len(effects) == 1 else "them"} the error '
-        f'{change(root_mean_square(diagnosis.residuals.error), residual, unit)}')
+        drives = listed([f'{drive} at {slip.frequency:.2g} Hz'
+                         for drive, slip in diagnosis.stick_slip.items()])
+        return f'Stick-slip on {drives}. No missing effect can be identified in such a motion.'
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with the reported effects' if effects else '')
-        return f'{little[:1].upper()}{little[1:]}. No effect of the catalogue explains the rest.'
+        return f'{sentence(little)} No effect of the catalogue explains the rest.'
+    residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
+    is_noise = residual <= AT_NOISE * diagnosis.noise_floor
+    lacking = _lacking(diagnosis)
+    fall = f'ith {"it" if len(effects) == 1 else "them"} the error ' + change(
+        root_mean_square(diagnosis.residuals.error), residual, unit)
     if diagnosis.unconfirmed and not effects and not diagnosis.depends_on:
         return 'No effect is supported by held-out data.' + ('' if is_noise else (
             f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
-    if any(effect.course is not None and effect.course.kind != SINCE for effect in effects):
-        return (f'The error changes during the recording, most likely because '
-                f'{_lacking(diagnosis)}. {fall}.')
-    if diagnosis.verdict == 'unknown':
-        groups = unexplained_groups(diagnosis)
-        places = [place_on(group) for group in groups[:2]] or [
-            f'the error of {drive} is {ratio:.1f} times its noise'
-            for drive, ratio in diagnosis.above_noise.items()]
-        if len(groups) > 2:
-            places.append(f'in {len(groups) - 2} more place{"s" * (len(groups) > 3)}')
-        more = f' In addition, {_lacking(diagnosis)}; w{fall[1:]}.' if effects else ''
+    groups = unexplained_groups(diagnosis)
+    places = [place_on(group) for group in groups[:2]] or [
+        f'the error of {drive} is {ratio:.1f} times its noise'
+        for drive, ratio in diagnosis.above_noise.items()]
+    if places:
+        places += [f'in {len(groups) - 2} more place{"s" * (len(groups) > 3)}'] * (len(groups) > 2)
         return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
-                + more)
-    unseen = ('The recording does not show how much of the error of '
+                + (f' In addition, {lacking}; w{fall}.' if effects else ''))
+    unseen = (f'The recording does not show how much of the error of '
               f'{listed(diagnosis.unseen_noise)} is noise.') if diagnosis.unseen_noise else ''
     if not effects:
-        if unseen and not diagnosis.since:
-            return f'No effect is reported. {unseen}'
-        return (f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
-                f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
-    which = ' (the data do not separate these)' if any(
-        _rivals(diagnosis, effect) for effect in effects) else ''
+        return f'No effect is reported. {unseen}' if unseen and not diagnosis.since else (
+            f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
+            f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
+    which = ' (the data do not separate these)' if diagnosis.indistinguishable else ''
     level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
-    missing = _lacking(diagnosis)
-    begin = 'T' if missing.startswith('the model') else missing[:1]
-    return f'{begin}{missing[1:]}{which}. {fall}{level}'
+    begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
+    return f'{begin}{lacking[1:]}{which}. W{fall}{level}'
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
@@ -321,17 +304,14 @@ def _lacking(diagnosis: Diagnosis) -> str:
 def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     """Return the input model's values of an effect and those of the recordings."""
     fitted = [value for value in _fitted(diagnosis, effect) if value.given is not None]
-    several = len({value.drive for value in fitted}) > 1
-    names = [(f'{value.parameter.symbol} ' if len(effect.effect.parameters) > 1 else '', (
-        f' on {value.drive}' if several else '')) for value in fitted[:MOST_CHANGED]]
-    given, found = (', '.join(f'{symbol}{text}{where}' for (symbol, where), text in zip(
-        names, texts, strict=False)) for texts in (
-            [with_uncertainty(value.given or 0.0, 0.0, value.estimate.unit, value.size)
-             for value in fitted], [value.text for value in fitted]))
+    values = ', '.join(
+        f'{value.parameter.symbol} '
+        f'{with_uncertainty(value.given or 0.0, 0.0, value.estimate.unit, value.size)}'
+        f'{f" on {value.drive}" if value.drive else ""} (this recording: {value.text})'
+        for value in fitted[:MOST_CHANGED])
     rivals = _rivals(diagnosis, effect)
-    other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
-    return (f'{_title(diagnosis, effect)} is in the model with {given}, but this recording gives '
-            f'{found}{other}')
+    other = f', or the model lacks {listed(rivals, "or")}' if rivals else ''
+    return f'{_title(diagnosis, effect)} is in the model with {values}{other}'
 
 
 # Findings
@@ -411,7 +391,8 @@ def _fitted(diagnosis: Diagnosis, effect: FoundEffect) -> list[FittedValue]:
             values.append(FittedValue(effect.name, drive, known[name], estimate, given))
     values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
                for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
-    return sorted(values, key=lambda value: order.index(value.drive))
+    return sorted(values, key=lambda value: (value.drive not in order, (
+        order.index(value.drive) if value.drive in order else 0)))
 
 
 def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
@@ -434,47 +415,26 @@ def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
     if rivals := _rivals(diagnosis, effect):
         yield f'The data do not separate {effect.name} from {listed(rivals, "or")}.'
     for value in _fitted(diagnosis, effect):
-        number, what = value.estimate, value.parameter.description
-        lowest = effect.effect.unphysical_below.get(value.parameter.name, -float('inf'))
-        if number.value < lowest:
-            doubt = ('' if number.value + INTERVAL * number.std < lowest else
-                     ', though zero is within its uncertainty')
-            kind = 'friction' if 'friction' in effect.name else what
-            yield (f'{_placed(diagnosis, effect.name, (value.drive,) if value.drive else None)}: '
-                   f'{what} is negative, {value.text}{doubt}. Negative {kind} is impossible: '
-                   'the model has too much of it, or another effect looks like it.')
+        if value.estimate.value < effect.effect.unphysical_below.get(
+                value.parameter.name, -float('inf')):
+            yield (f'{value.parameter.description} is negative'
+                   f'{f" on {value.drive}" if value.drive else ""}, {value.text}. This is '
+                   'impossible: the model has too much of it, or another effect looks like it.')
     for names in effect.places:
         if len(names) > 1:
             yield (f'No motion separates {names[0]} from {listed(names[1:], "or")}, because they '
                    'move alike.')
     if effect.effect is AsymmetricFriction:
-        yield from _two_in_one(diagnosis, effect)
+        yield ('Its dry part equals coulomb_friction of the mean of both directions plus '
+               'effort_offset of half their difference. Only a reading at rest separates them.')
     if effect.at_bound:
         yield (f'The value of {listed(effect.at_bound)} is at the limit of the values that were '
                'tried; the true one may be beyond.')
 
 
-def _two_in_one(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
-    """Yield which two other effects are the same as the dry part of asymmetric friction."""
-    forces: dict[str, dict[str, float]] = {}
-    for value in _fitted(diagnosis, effect):
-        forces.setdefault(value.drive, {})[value.parameter.name] = value.estimate.value
-    for drive, values in forces.items():
-        forward, backward = (values.get(f'force_{way}', 0.0) for way in ('forward', 'backward'))
-        unit = diagnosis.residuals.units_of(drive).effort
-        if forward or backward:
-            yield (f'{drive}: the dry part equals coulomb_friction of '
-                   f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
-                   f'{in_unit((forward - backward) / 2, unit)}. Only a reading at rest separates '
-                   'them.')
-
-
 def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
-    # Widths of reversal have no uncertainty: two digits, or as many as show the change.
-    after = with_uncertainty(number.after, number.std, number.unit) if number.std else next(
-        f'about {with_uncertainty(value, 0.0, number.unit)}' for digits in range(2, 8)
-        if (value := float(f'{number.after:.{digits}g}')) != number.before or digits == 7)
-    moved = f'{number.label}: {with_uncertainty(number.before, 0.0, number.unit)} becomes {after}'
+    moved = (f'{number.label}: {with_uncertainty(number.before, 0.0, number.unit)} becomes '
+             f'{with_uncertainty(number.after, number.std, number.unit)}')
     tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
     if not tolerance:
         return f'{moved}: calibrated'

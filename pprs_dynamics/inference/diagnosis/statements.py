@@ -15,18 +15,14 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.diagnosis.quantities import (
     listed,
-    percent,
     plain,
     sentence,
     with_sign,
 )
-from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import DrivePatterns
-from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 
-STICK_SLIP = 'stick_slip'  # kind of statement
 # The unit in which a variable is read: factor from SI, and name; of linear and of rotary drives.
 UNITS = {
     'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s²'),
@@ -59,15 +55,6 @@ LEADS = {
                  'hose, a cable, a workpiece', 'remove what touches the platform and repeat'),
     'drive': ('a coupling of the two drives: a shared cable chain or supply, a bending frame, '
               'cross-talk between sensors', 'move that drive alone, with this one at rest'),
-}
-SHAPES = {
-    'offset': 'a constant', 'range': 'a shift within a range',
-    'directed_range': 'a shift in the direction of motion, within a range',
-    'growth': 'a curve', 'directed_growth': 'a curve that changes sign with the direction',
-    'one_way': 'a curve in one direction only', 'friction': 'a step at reversals',
-    'fading': 'a step at reversals that fades with speed', 'fast': 'a curve at high speed',
-    'bump': 'a bump',
-    'ripple': 'a wave', 'line': 'a vibration at one frequency',
 }
 
 
@@ -241,16 +228,6 @@ def _ends(
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
 
 
-def word_stick_slip(drive: str, slip: StickSlip, residuals: Residuals) -> Statement:
-    """Return the statement that a drive sticks and slips."""
-    unit = residuals.units_of(drive).position
-    return Statement(
-        drive, 'frequency', (slip.frequency, slip.frequency), 1.0, slip.share,
-        f'{drive}: it sticks and slips at {slip.frequency:.2g} Hz in {percent(slip.share)} of the '
-        f'time, steps of {slip.step:.2g} {unit}, speeds up to {slip.speed:.2g} {unit}/s',
-        np.inf, STICK_SLIP, 0.0, 0.0)
-
-
 def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str, str]:
     """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
     first = group[0]
@@ -258,17 +235,8 @@ def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str
     texts = '; '.join(
         statement.text if len(group) > 1 else statement.text.removeprefix(f'{statement.drive}: ')
         for statement in group)
-    if first.kind == STICK_SLIP:
-        return (f'stick_slip on {drives}', f'Stick-slip on {drives}: {texts}.',
-                'The drive stands while its effort rises, slips while the effort falls, and '
-                'repeats this at one frequency.',
-                'Friction that falls with speed (boundary lubrication, dry guides), a soft '
-                'transmission, and a controller that is slow or has little damping.',
-                'Move faster: above some speed it ends. Stiffer gains or another lubricant change '
-                'that speed and the frequency.')
-    shape = SHAPES.get(first.kind, 'drawn in the report')
     what = (f'The error of {drives}, {place_of(first.variable)}, has the form of no effect of the '
-            f'catalogue. Its form is {shape}: {texts}.')
+            f'catalogue: {texts}.')
     evidence = max(statement.evidence for statement in group)
     why = (f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and every effect '
            'of the catalogue explains it worse.')

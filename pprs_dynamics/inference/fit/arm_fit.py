@@ -10,8 +10,8 @@ be, and weakly to their description: what the motion does not excite stays as it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,26 +73,17 @@ class ArmColumns:
     reconstruction: Reconstruction
 
     @classmethod
-    def of(cls, model: DriveModel, recording: Recording) -> ArmColumns:
-        """Return the columns of a recording; errors as `reconstruct`."""
-        return cls.of_motion(model, reconstruct(model, recording))
-
-    @classmethod
     def of_motion(cls, model: DriveModel, found: Reconstruction) -> ArmColumns:
         """Return the columns of a recording whose motion is known."""
         treat = found.treat
-        total = treated_forces(model, found)['total']
-        count = len(model.drives)
-        inertial = np.empty((len(treat), count, model.robot.inertial.size))
-        for chunk in found.chunks():
-            s: Any = chunk.motion
-            rows = model.robot.regressor(s.position, s.velocity, s.acceleration)
-            inertial[chunk.blocks] = chunk.treat(rows)
+        inertial = _treated(found, lambda s: model.robot.regressor(
+            s.position, s.velocity, s.acceleration))
         motion = np.stack((treat(found.acceleration), treat(found.velocity)), axis=-1)
-        columns = cls(treat(found.effort), np.zeros_like(total), inertial, motion, found)
-        own = columns.efforts(own_numbers(model), model.robot.inertial,
-                              np.asarray(model.reversal.velocity))
-        return cls(columns.measured, total - own, inertial, motion, found)
+        total = treated_forces(model, found)['total']
+        columns = cls(treat(found.effort), total, inertial, motion, found)
+        return replace(columns, rest=total - inertial @ model.robot.inertial.ravel() - np.einsum(
+            'mjk,jk->mj', columns.of_joints(np.asarray(model.reversal.velocity)),
+            own_numbers(model)))
 
     def turning(self, width: Array) -> Array:
         """Return sgn of the velocities, treated, turning over within widths (n,), (M, n)."""
@@ -107,28 +98,15 @@ class ArmColumns:
 
     def numbers(self, model: DriveModel) -> Array:
         """Return the columns of all numbers, (M, n, P): of links, passive joints, each drive."""
-        found = self.reconstruction
-        passive = np.empty((len(self.measured), len(model.drives), 2 * len(own_passive(model))))
-        for chunk in found.chunks():
-            assert isinstance(chunk.motion, JointMotion)
-            passive[chunk.blocks] = chunk.treat(of_passive(model, chunk.motion))
+        passive = _treated(self.reconstruction, lambda motion: of_passive(model, motion))
         numbers: Array = np.concatenate((self.inertial, passive, _of_each(self.of_joints(
             model.reversal.widths(len(model.drives))))), axis=2)
         return numbers
 
-    def efforts(self, own: Array, inertial: Array, width: Array) -> Array:
-        """Return the efforts of a model, (M, n).
 
-        Parameters
-        ----------
-        own : (n, 4) array
-            Armature, viscous and dry friction, and offset of each joint.
-        inertial : (n, 10) array
-        width : (n,) array
-        """
-        efforts: Array = (self.rest + self.inertial @ inertial.ravel()
-                          + np.einsum('mjk,jk->mj', self.of_joints(width), own))
-        return efforts
+def _treated(found: Reconstruction, columns: Callable[[Any], Array]) -> Array:
+    """Return columns of a motion, treated, (M, ...)."""
+    return np.concatenate([chunk.treat(columns(chunk.motion)) for chunk in found.chunks()])
 
 
 def own_numbers(model: DriveModel) -> Array:
@@ -140,7 +118,7 @@ def own_numbers(model: DriveModel) -> Array:
 
 def columns_of(model: DriveModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
     """Return the columns of recordings."""
-    return [ArmColumns.of(model, recording) for recording in recordings]
+    return [ArmColumns.of_motion(model, reconstruct(model, one)) for one in recordings]
 
 
 @dataclass(frozen=True)
@@ -192,9 +170,8 @@ def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
             width = _widths(columns, rest - inertial @ bodies.inertial(point).ravel(), known, own,
                             width, moving)
         joints = np.concatenate([one.of_joints(width) for one in columns])
-        problem = _Problem(bodies, inertial, joints, rest, known & moving, start)
-        weights = problem.weights(point, own)
-        point, own, spread = problem.solved(weights, point, own)
+        point, own, spread = _solved(bodies, inertial, joints, np.where(
+            known & moving, rest, np.nan), start, point, own)
     links = len(bodies)
     ratio = np.linalg.eigvalsh(spread[:links, :links]) / SPREAD ** 2
     masses = np.sqrt(np.diag(spread)[9:links:PARAMETERS]) / SPREAD
@@ -307,8 +284,12 @@ def base_prior(model: DriveModel, efforts: Array, numbers: Array) -> Array:
     return directions
 
 
-class _Problem:
-    """Least squares in points of `Bodies` and the joints' own numbers.
+def _solved(bodies: Bodies, inertial: Array, joints: Array, rest: Array, start: Array,
+            point: Array, own: Array) -> tuple[Array, Array, Array]:
+    """Return the best point of `Bodies` and own numbers, and the covariance of both.
+
+    Each joint is weighted by one over the variance of its error, by independent samples. Armature
+    and friction are not negative.
 
     Parameters
     ----------
@@ -316,68 +297,43 @@ class _Problem:
     inertial : (M, n, 10 n) array
     joints : (M, n, 4) array
     rest : (M, n) array
-        Measured efforts without added effects.
-    known : (M, n) bool array
+        Measured efforts without added effects; NaN where they do not count.
     start : (n, 4) array
         What own numbers are pulled to, as weakly as can be.
+    point, own : (10 n,) and (n, 4) arrays
+        To start from.
     """
+    from scipy.optimize import least_squares  # here: commands start without it
 
-    def __init__(self, bodies: Bodies, inertial: Array, joints: Array, rest: Array, known: Array,
-                 start: Array) -> None:
-        self.bodies, self.start = bodies, start
-        count = rest.shape[1]
-        self.rows, self.target = [], []
-        for j in range(count):
-            own = np.zeros((int(known[:, j].sum()), count * OF_JOINT))
-            own[:, j * OF_JOINT:(j + 1) * OF_JOINT] = joints[known[:, j], j]
-            self.rows.append(np.concatenate((inertial[known[:, j], j], own), axis=1))
-            self.target.append(rest[known[:, j], j])
-        # All that depends on the samples, once: R and Q' y of each joint.
-        self.reduced = [np.linalg.qr(np.column_stack((rows, y)), mode='r') if len(y) else None
-                        for rows, y in zip(self.rows, self.target, strict=True)]
-        self.own_spread = own_spread(np.where(known, rest, np.nan), joints)
+    error = rest - inertial @ bodies.inertial(point).ravel() - np.einsum(
+        'mjk,jk->mj', joints, own)
+    # All that depends on the samples, once: weighted R and Q' y of each joint.
+    reduced, links, spread = [], len(bodies), own_spread(rest, joints).ravel()
+    for j, at in enumerate(np.isfinite(rest).T):
+        if not at.any():
+            continue
+        rows = np.zeros((int(at.sum()), links + own.size + 1))
+        rows[:, :links], rows[:, -1] = inertial[at, j], rest[at, j]
+        rows[:, links + j * OF_JOINT:links + (j + 1) * OF_JOINT] = joints[at, j]
+        weight = independent_share(error[at, j]) / max(float(np.mean(error[at, j] ** 2)), 1e-12)
+        reduced.append(np.sqrt(weight) * np.linalg.qr(rows, mode='r'))
+    weighted = np.concatenate(reduced)
 
-    def errors(self, point: Array, own: Array) -> list[Array]:
-        """Return the residual of each joint's efforts."""
-        numbers = np.concatenate((self.bodies.inertial(point).ravel(), own.ravel()))
-        return [y - rows @ numbers for rows, y in zip(self.rows, self.target, strict=True)]
+    def residuals(unknown: Array) -> Array:
+        numbers = np.concatenate((bodies.inertial(unknown[:links]).ravel(), unknown[links:], [-1]))
+        return np.concatenate((weighted @ numbers, bodies.distance(unknown[:links]) / SPREAD,
+                               (unknown[links:] - start.ravel()) / spread))
 
-    def weights(self, point: Array, own: Array) -> Array:
-        """Return one over the variance of each joint's error, by independent samples."""
-        weights = np.zeros(len(self.target))
-        for j, error in enumerate(self.errors(point, own)):
-            if len(error):
-                share = min(1.0, independent_share(error))
-                weights[j] = share / max(float(np.mean(error ** 2)), 1e-12)
-        return weights
-
-    def _residuals(self, unknown: Array, weights: Array) -> Array:
-        links = len(self.bodies)
-        point, own = unknown[:links], unknown[links:]
-        numbers = np.concatenate((self.bodies.inertial(point).ravel(), own, [-1.0]))
-        parts = [np.sqrt(weight) * (reduced @ numbers)
-                 for weight, reduced in zip(weights, self.reduced, strict=True)
-                 if reduced is not None]
-        return np.concatenate((*parts, self.bodies.distance(point) / SPREAD,
-                               (own - self.start.ravel()) / self.own_spread.ravel()))
-
-    def solved(self, weights: Array, point: Array, own: Array) -> tuple[Array, Array, Array]:
-        """Return the best point and own numbers, and the covariance of both.
-
-        Armature and friction are not negative.
-        """
-        from scipy.optimize import least_squares  # here: commands start without it
-
-        lowest = np.zeros(own.shape)
-        lowest[:, OFFSET] = -np.inf
-        # Dogbox puts a number that would be negative at 0, the other methods only near it.
-        found = least_squares(
-            self._residuals, np.concatenate((point, np.maximum(own, lowest).ravel())),
-            bounds=(np.concatenate((np.full(len(point), -np.inf), lowest.ravel())), np.inf),
-            method='dogbox', x_scale='jac', max_nfev=60, args=(weights,))
-        J: Array = np.asarray(found.jac)
-        covariance: Array = np.asarray(np.linalg.inv(J.T @ J), dtype=float)
-        return found.x[:len(point)], found.x[len(point):].reshape(own.shape), covariance
+    lowest = np.zeros(own.shape)
+    lowest[:, OFFSET] = -np.inf
+    # Dogbox puts a number that would be negative at 0, the other methods only near it.
+    found = least_squares(
+        residuals, np.concatenate((point, np.maximum(own, lowest).ravel())),
+        bounds=(np.concatenate((np.full(links, -np.inf), lowest.ravel())), np.inf),
+        method='dogbox', x_scale='jac', max_nfev=60)
+    J: Array = np.asarray(found.jac)
+    covariance: Array = np.asarray(np.linalg.inv(J.T @ J), dtype=float)
+    return found.x[:links], found.x[links:].reshape(own.shape), covariance
 
 
 def independent_share(error: Array) -> float:

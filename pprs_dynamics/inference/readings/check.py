@@ -18,12 +18,12 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.efforts import (
-    effort_scales,
+    constants_reading,
     find_changed_efforts,
     find_no_measurements,
     find_scales,
     find_sign_bit,
-    gain_line,
+    unit_reading,
 )
 from pprs_dynamics.inference.readings.evidence import (
     Parts,
@@ -102,7 +102,7 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     if found := tuple(find_sign_bit(recording)):
         return found
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
-                if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
+                if (excerpt := excerpt_of(recording, table.STRETCHES, unit)) is not None}
     if wrong := [*_of_rate(model, recording, excerpts.get(1.0))]:
         return tuple(wrong)
     search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
@@ -185,12 +185,9 @@ class Search:
         if 1.0 in self.excerpts and start.left < 1.5 * table.CLOSEST and start.is_plain and not (
                 self._outside(first, self.excerpts[1.0])):
             return None
-        best: tuple[Fit | None, float] = (None, start.score)
-        if not start.is_plain:
-            best = start, start.score
+        self.fits = [start]
         for reading in (first, *readings(drives, self.model.units, self.are_counts)):
-            if (reading.kind == 'drive_order' and best[0] is not None
-                    and best[0].left < table.CLOSE_FIT):
+            if reading.kind == 'drive_order' and self._top().left < table.CLOSE_FIT:
                 break
             for unit in self.excerpts:
                 fit = None if reading is first and unit == 1 else self.fit(reading, unit)
@@ -198,46 +195,43 @@ class Search:
                 if fit is not None and (reading.kind != 'drive_order'
                                         or fit.left < table.BETTER_ORDER * start.left):
                     self.fits.append(fit)
-                    best = self._better(best, fit)
-        # Zeros that are quarter turns off, one drive after another.
-        seeds = [start, *([best[0]] if best[0] else [])]
-        for seed in seeds:
-            best = self._turned(seed, best)
-        found = best[0]
-        return None if found is None or found.left > table.GOOD_FIT or not self._is_certain(
-            found) else found
+        for seed in (start, self._top()):
+            self.fits += self._turned(seed)
+        best = self._top()
+        is_sure = not best.is_plain and best.left <= table.GOOD_FIT and self._is_certain(best)
+        return best if is_sure else None
+
+    def _top(self) -> Fit:
+        """Return the best reading; of those that fit alike the first, which is the simplest."""
+        most = max(fit.score for fit in self.fits)
+        return next(fit for fit in self.fits if fit.score > most - 0.5)
 
     def rival(self, best: Fit) -> Fit | None:
         """Return another reading of positions that is nearly as likely as the best one.
 
         Inertia alone cannot separate positions in another unit from efforts in another.
         """
-        units = ('', 'position_unit')
-        others = [fit for fit in self.fits if best.score - fit.score < table.SURE
-                  and not fit.is_plain and fit.reading.kind in units and best.reading.kind in units
+        others = [fit for fit in self.fits if fit.reading.kind == 'position_unit'
+                  and best.score - fit.score < table.SURE
                   and fit.time_unit == best.time_unit == 1
+                  and best.reading.kind in ('', 'position_unit')
                   and not np.allclose(fit.reading.position, best.reading.position)]
         return max(others, key=lambda fit: fit.score, default=None)
 
-    def _turned(self, seed: Fit, best: tuple[Fit | None, float]) -> tuple[Fit | None, float]:
+    def _turned(self, seed: Fit) -> Iterator[Fit]:
+        """Yield readings with zeros that are quarter turns off, one drive after another."""
         if seed.left < table.CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
-            return best
+            return
         for _ in self.model.drives:
             fits = [fit for d, units in enumerate(self.model.units) if units.turns
                     for turn in table.QUARTERS
                     if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
                                         seed.time_unit)) is not None]
-            next_one = max(fits, key=lambda fit: fit.score, default=None)
-            if next_one is None or next_one.score <= seed.score:
-                break
-            seed = next_one
-            best = self._better(best, seed)
-        return best
-
-    @staticmethod
-    def _better(best: tuple[Fit | None, float], fit: Fit) -> tuple[Fit | None, float]:
-        # Of readings that fit alike the first, which is the simplest, counts.
-        return (fit, fit.score) if fit.score > best[1] + 0.5 and not fit.is_plain else best
+            best = max(fits, key=lambda fit: fit.score, default=seed)
+            if best.score <= seed.score:
+                return
+            seed = best
+            yield seed
 
     def fit(self, reading: Reading, unit: float, in_pieces: bool = False) -> Fit | None:
         """Return a reading with its best scales of efforts; None where it cannot be."""
@@ -376,7 +370,7 @@ def _time_units(recording: Recording) -> list[float]:
 
 def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
-    drives, units = model.drives, model.units
+    drives = model.drives
     if fit.time_unit != 1.0:
         yield OtherReading('time_unit', 1, f'the times look like {table.TIMES[fit.time_unit]}: as '
                            f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
@@ -389,27 +383,10 @@ def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[Other
         yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
                               scales=position_scales(model, fit.reading))
     if fit.has_constants:
-        every = tuple(range(len(drives)))
-        yield OtherReading.of(
-            'drive_constant', drives, every, f'the effort of {named(drives, every)} looks like '
-            'currents in amperes, or another unit: '
-            + ', '.join(f'{scale:.3g}' for scale in fit.scales) + ' times what the model says',
-            gain_line(fit.scales.tolist()))
+        yield constants_reading(model, dict(enumerate(fit.scales.tolist())))
         return
-    for scale in dict.fromkeys(fit.scales.tolist()):
-        group = tuple(np.flatnonzero(fit.scales == scale).tolist())
-        if scale == 1.0:
-            continue
-        unit = ' or '.join(dict.fromkeys(table.EFFORTS[abs(scale)].format(units[k].effort)
-                                         for k in group)) if abs(scale) != 1 else None
-        times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
-        guess = '' if unit is None else f', as if it were in {unit}'
-        is_either = scale < 0 and len(group) == len(drives)
-        other = f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
-        yield OtherReading.of('effort_sign' if unit is None else 'effort_unit', drives, group,
-                              f'the effort of {named(drives, group)} looks like {times} what '
-                              f'the model says{guess}{other if is_either else ""}',
-                              scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
+    for scale in dict.fromkeys(fit.scales[fit.scales != 1].tolist()):
+        yield unit_reading(model, np.flatnonzero(fit.scales == scale).tolist(), scale)
 
 
 def position_scales(model: DriveModel, reading: Reading) -> Scales:

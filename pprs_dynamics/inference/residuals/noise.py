@@ -26,7 +26,7 @@ C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, Prentice-Hall (1974)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -202,41 +202,12 @@ class NoiseSpectrum:
         means = np.concatenate(([1.0], np.arctan(ratio) / ratio))
         return float(np.sqrt(self.amplitudes @ means))
 
-    def rms_at(self, period: float) -> float:
-        """Return the rms of samples `period` apart [s], of which these are means [N]."""
-        # Averaging took white noise out; what is slower it left.
-        white = np.zeros_like(self.amplitudes)
-        white[0] = self.amplitudes[0] * (self.period / period - 1)
-        return replace(self, amplitudes=self.amplitudes + white).rms
-
     def effective_samples(self, samples: int) -> float:
         """Return how many independent samples have a mean as uncertain as `samples` of these.
 
         With what the shapes have at frequency 0, not with what may lie below the recording's.
         """
         return float(np.clip(samples * self.rms ** 2 / self.amplitudes.sum(), 1, samples))
-
-    def covariance(self, samples: int, period: float) -> Array:
-        """Return the autocovariance at lags 0 .. samples - 1 of samples `period` apart [N^2]."""
-        lag = period * np.arange(samples)
-        # A Lorentzian spectrum belongs to an exponential covariance.
-        rate = 2 * np.pi * self.corners
-        values: Array = (self.amplitudes[1:] * rate / 2 * self.period) @ np.exp(
-            -rate[:, None] * lag)
-        values[0] = self.rms_at(period) ** 2
-        return values
-
-    @property
-    def fast_rms(self) -> float:
-        """Root of the mean square of what lies at the higher frequencies [N].
-
-        All shapes reach there, also those of slow noise: it is 0 for no noise that is one.
-        """
-        highest = 0.5 / self.period
-        lowest = min(SLOW_SHARE * self.corners[-1], highest)
-        shares = np.concatenate(([1 - lowest / highest], self.corners / highest * (
-            np.arctan(highest / self.corners) - np.arctan(lowest / self.corners))))
-        return float(np.sqrt(self.amplitudes @ shares))
 
 
 def _shapes(corners: Array, frequency: Array) -> Array:

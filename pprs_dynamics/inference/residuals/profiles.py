@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import dct
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -31,15 +32,12 @@ class Profile:
     mean, uncertainty : (K,) array
         Mean error and its standard deviation under the correlated noise [N]; NaN where a bin
         holds nothing.
-    rms : (K,) array
-        [N].
     samples : (K,) int array
     """
 
     edges: Array
     mean: Array
     uncertainty: Array
-    rms: Array
     samples: np.typing.NDArray[np.int_]
 
 
@@ -77,17 +75,18 @@ def error_profile(
     count = len(edges) - 1
     place = bin_of(values, edges)
     known = np.isfinite(error)
-    mean, spread, rms = (np.full(count, np.nan) for _ in range(3))
+    mean, spread = np.full((2, count), np.nan)
     samples = np.zeros(count, dtype=int)
-    covariance = noise.covariance(len(error), residuals.period)
+    # Variance of the coefficients of noise, of samples that may be means of the noise's.
+    power = noise.power(np.arange(len(error)) / (2 * len(error) * residuals.period)) * (
+        noise.period / residuals.period)
     for k in range(count):
         held = known & (place == k)
         samples[k] = held.sum()
         if samples[k]:
             mean[k] = error[held].mean()
-            rms[k] = np.sqrt(np.mean(error[held] ** 2))
-            spread[k] = np.sqrt(_variance_of_mean(held, covariance))
-    return Profile(edges, mean, spread, rms, samples)
+            spread[k] = np.sqrt(power @ dct(held.astype(float), norm='ortho') ** 2) / samples[k]
+    return Profile(edges, mean, spread, samples)
 
 
 def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Spectrum:
@@ -109,15 +108,6 @@ def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Sp
             weights.append(part.stop - part.start)
     return Spectrum(frequency, np.average(powers, axis=0, weights=weights),
                     2 * noise.period * noise.power(frequency))
-
-
-def _variance_of_mean(held: np.typing.NDArray[np.bool_], covariance: Array) -> float:
-    """Return the variance of the mean over the marked samples of stationary noise."""
-    n = len(held)
-    power = np.abs(np.fft.rfft(held.astype(float), 2 * n)) ** 2
-    pairs = np.fft.irfft(power, 2 * n)[:n]
-    total = pairs[0] * covariance[0] + 2 * float(pairs[1:] @ covariance[1:])
-    return float(max(total, 0.0) / held.sum() ** 2)
 
 
 def bin_edges(values: Array, bins: int) -> Array:

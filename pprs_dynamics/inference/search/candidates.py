@@ -379,8 +379,12 @@ class CandidateSet:
 
     @property
     def is_nonlinear(self) -> bool:
-        """Whether one of its effects changes how others show."""
-        return any(candidate.effect.nonlinear for candidate in self.effects)
+        """Whether an effect that is there all the time changes how others show.
+
+        What begins within the recordings is part of no linearisation.
+        """
+        return any(candidate.effect.nonlinear for candidate in self.effects
+                   if candidate.course is None)
 
     @property
     def unknowns(self) -> tuple[UnknownCandidate, ...]:

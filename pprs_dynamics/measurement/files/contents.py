@@ -38,13 +38,11 @@ class Contents:
         Columns with numbers in them.
     decimal : str
         What is between the whole and the rest of a number.
-    has_header : bool
     """
 
     joints: Mapping[str, Mapping[str, set[str]]] = field(default_factory=dict)
     series: tuple[Series, ...] = ()
     decimal: str = '.'
-    has_header: bool = True
 
 
 def look_into(path: Path) -> Contents:
@@ -71,8 +69,7 @@ def look_into(path: Path) -> Contents:
     if isinstance(table, CsvTable) and not table.is_numeric:
         with_commas = CsvTable.open(path, ',')
         table = with_commas if with_commas.is_numeric else table
-    return Contents(series=tuple(table.series(ROWS)), decimal=table.decimal,
-                    has_header=bool(table.names))
+    return Contents(series=tuple(table.series(ROWS)), decimal=table.decimal)
 
 
 def _joints(bag: Bag) -> dict[str, dict[str, set[str]]]:

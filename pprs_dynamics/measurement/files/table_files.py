@@ -21,7 +21,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import (
-    ELEMENT,
     KINDS,
     ArrayTable,
     open_arrays,
@@ -74,33 +73,53 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         For Parquet without pyarrow.
     """
     columns = drives.columns or RecordedColumns()
-    return (_of_several(path, drives, columns, progress) if columns.files else
-            _of_one(path, drives, columns, topic, progress))
+    files = files_of(path, columns.files) if columns.files else {'position': path}
+    joints, shared = drives.joints or drives.names, None
+    if 'time' in files:
+        table = _opened(files.pop('time'), columns)
+        own: Column = columns.time if columns.time is not None else next(
+            (name for name in TIME_COLUMNS if name in table.names), 1)
+        shared = table.read([own])[0]
+    stamps, epoch, prefix = np.zeros(0), 0, ''
+    arrays: dict[tuple[str, str], Array] = {}
+    told: list[Defect] = []
+    for quantity, file in sorted(files.items(), key=lambda one: one[0] != 'position'):
+        table = _opened(file, columns)
+        time = None if shared is not None else _time_column(table, columns)
+        if columns.files:
+            chosen = {(joint, quantity): columns.drives[drive].names[quantity]
+                      for joint, drive in zip(joints, drives.names, strict=True)
+                      if quantity in columns.drives[drive].names}
+        else:
+            chosen, prefix = _chosen(table, drives, columns, topic)
+        if not chosen:
+            continue
+        wanted = list(dict.fromkeys([*([] if time is None else [time]), *chosen.values()]))
+        _require(table, wanted)
+        read = dict(zip(wanted, table.read(wanted, progress), strict=True))
+        count = len(read[wanted[-1]])
+        if shared is not None and count != len(shared):
+            raise UnreadableFileError(file, f'it has {counted(count, "row")}, but the file of '
+                                      f'times has {len(shared)}')
+        seconds, start, remarks = _seconds(shared if time is None else read[time], columns, count)
+        series = {key: read[column] for key, column in chosen.items()}
+        seconds = seconds + (start - epoch if arrays else 0)
+        if not arrays:
+            stamps, epoch = seconds, start
+            told += remarks if columns.files else (*remarks, *_ignored(table, wanted))
+        elif len(seconds) != len(stamps) or np.any(seconds != stamps):
+            told.append(Defect('merged', len(stamps), f'{file.name} has times of its own'))
+            whole, at = (np.rint((one - stamps[0]) * 1e9).astype(np.int64)
+                         for one in (seconds, stamps))
+            series = {key: at_stamps(at, whole, values) for key, values in series.items()}
+        arrays.update(series)
+    return Samples.of_columns(joints, stamps, arrays, _source(path, columns, prefix), tuple(told),
+                              epoch)
 
 
 def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
     """Return a table by its first bytes; see `CsvTable.open`."""
     return open_arrays(path) or CsvTable.open(path, decimal, likely)
-
-
-def read_column(path: Path) -> Array:
-    """Return the first column of a table without a header, (N,)."""
-    column: Array = open_table(path).read([1])[0]
-    return column
-
-
-def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
-            progress: Progress | None) -> Samples:
-    table = _opened(path, columns)
-    time = _time_column(table, columns)
-    chosen, prefix = _chosen(table, drives, columns, topic)
-    wanted = list(dict.fromkeys([*([] if time is None else [time]), *chosen.values()]))
-    arrays: dict[Column, Any] = dict(zip(wanted, table.read(wanted, progress), strict=True))
-    seconds, epoch, told = _seconds(None if time is None else arrays[time], columns,
-                                    len(arrays[wanted[-1]]))
-    return Samples.of_columns(
-        drives.joints or drives.names, seconds, {key: arrays[one] for key, one in chosen.items()},
-        _source(path, columns, prefix), (*told, *_ignored(table, wanted)), epoch)
 
 
 def _opened(path: Path, columns: RecordedColumns) -> Table:
@@ -122,7 +141,6 @@ def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
 def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
     """Return the column of times; None where a rate replaces it."""
     if columns.time is not None:
-        _require(table, [columns.time])
         return columns.time
     if columns.rate is not None:
         return None
@@ -146,8 +164,10 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     joints = drives.joints or drives.names
     named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
              for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
-    shared = _shared(table, joints, columns)
-    _require(table, [*named.values(), *shared.values()])
+    _require(table, [*named.values()])
+    # What is measured once for all drives.
+    shared = {(joint, name): columns.channels.get(name, name) for name in CHANNELS
+              if name in columns.channels or name in table.names for joint in joints}
     ours = tuple(joint for joint in joints if (joint, 'position') not in named)
     if not ours:
         return {**shared, **named}, ''
@@ -156,27 +176,13 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
         joint, slash, quantity = name.rpartition('/')
         prefix, _, drive = joint.rpartition('/')
         if slash and quantity in (*QUANTITIES, CURRENT, *CHANNELS):
-            of_prefix = found.setdefault(prefix, {})
-            if (drive, quantity) in of_prefix:
-                raise UnreadableFileError(table.path, f'the column {name!r} stands twice')
-            of_prefix[drive, quantity] = name
-    for name in TIME_COLUMNS:
-        if table.names.count(name) > 1:
-            raise UnreadableFileError(table.path, f'the column {name!r} stands twice')
+            found.setdefault(prefix, {})[drive, quantity] = name
     prefix = _prefix(table.path, found, ours, topic)
     chosen = {key: name for key, name in found[prefix].items() if key[0] in ours}
     for joint in ours:
         if (joint, 'effort') in chosen:
             chosen.pop((joint, CURRENT), None)
     return {**shared, **chosen, **named}, prefix
-
-
-def _shared(table: Table, joints: tuple[str, ...], columns: RecordedColumns,
-            ) -> dict[tuple[str, str], Column]:
-    """Return the columns of what is measured once for all drives, for each of them."""
-    found = {name: columns.channels.get(name, name) for name in CHANNELS
-             if name in columns.channels or name in table.names}
-    return {(joint, name): column for joint in joints for name, column in found.items()}
 
 
 def _require(table: Table, wanted: Sequence[Column]) -> None:
@@ -266,72 +272,6 @@ def _prefix(
         raise UnreadableFileError(
             path, f'there are the drives of {", ".join(complete)}: choose one with topic')
     return complete[0]
-
-
-# ------------------------------------------------------------ several files of one recording
-
-
-def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
-                progress: Progress | None) -> Samples:
-    """Read files of one quantity each, at the times of the positions."""
-    files = files_of(path, columns.files)
-    shared = None
-    if 'time' in files:
-        table = _opened(files['time'], columns)
-        own: Column = columns.time if columns.time is not None else next(
-            (name for name in TIME_COLUMNS if name in table.names), 1)
-        shared = table.read([own])[0]
-    stamps: Array | None = None
-    epoch = 0
-    joints, arrays, told = drives.joints or drives.names, {}, []
-    for quantity, file in sorted(files.items(), key=lambda one: one[0] != 'position'):
-        if quantity == 'time':
-            continue
-        table = _opened(file, columns)
-        chosen = {joint: columns.drives[drive].names[quantity]
-                  for joint, drive in zip(joints, drives.names, strict=True)
-                  if quantity in columns.drives[drive].names}
-        time = None if shared is not None else _time_column(table, columns)
-        if _is_one_column(table):
-            read, series = {}, _in_turn(table, chosen)
-        else:
-            _require(table, list(chosen.values()))
-            wanted = [*([] if time is None else [time]), *chosen.values()]
-            read = dict(zip(wanted, table.read(wanted, progress), strict=True))
-            series = {joint: read[column] for joint, column in chosen.items()}
-        count = len(next(iter(series.values()), ()))
-        if shared is not None and count != len(shared):
-            raise UnreadableFileError(file, f'it has {counted(count, "row")}, but '
-                                      f'{files["time"].name} {len(shared)}')
-        seconds, start, found = _seconds(shared if time is None else read[time], columns, count)
-        if stamps is None:
-            stamps, epoch, told = seconds, start, list(found)
-        seconds = seconds + (start - epoch)
-        if len(seconds) != len(stamps) or np.any(seconds != stamps):
-            told.append(Defect('merged', len(stamps), f'{file.name} has times of its own'))
-            whole, at = (np.rint((one - stamps[0]) * 1e9).astype(np.int64)
-                         for one in (seconds, stamps))
-            series = {joint: at_stamps(at, whole, values) for joint, values in series.items()}
-        arrays.update({(joint, quantity): values for joint, values in series.items()})
-    assert stamps is not None
-    return Samples.of_columns(joints, stamps, arrays, _source(path, columns), tuple(told), epoch)
-
-
-def _is_one_column(table: Table) -> bool:
-    return isinstance(table, CsvTable) and table.count == 1 and not table.names
-
-
-def _in_turn(table: Table, chosen: Mapping[str, Column]) -> dict[str, Array]:
-    """Return numbers that stand below each other in turn, `1[k]` those of each joint."""
-    assert isinstance(table, CsvTable)
-    elements = {joint: ELEMENT.fullmatch(str(column)) for joint, column in chosen.items()}
-    values = table.read([1])[0]
-    count = 1 + max((int(one[2]) for one in elements.values() if one), default=0)
-    if len(values) % count:
-        raise UnreadableFileError(
-            table.path, f'it has one column of {len(values)} numbers, must have as many for each '
-            f'of {count} joints, as 1[0] to 1[{count - 1}] say')
-    return {joint: values[int(one[2]) if one else 0::count] for joint, one in elements.items()}
 
 
 def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:

@@ -24,7 +24,6 @@ from pprs_dynamics.arrays import Array
 
 Kernel = Callable[..., Any]
 P = TypeVar('P', bound=tuple[Any, ...])
-Q = TypeVar('Q', bound=tuple[Any, ...])
 
 PLAIN = 'PPRS_DYNAMICS_PLAIN'  # set to anything but 0, nothing is compiled
 BLOCK = 2048  # samples: about 100 intermediate arrays then stay in a core's cache
@@ -66,10 +65,6 @@ class KernelParameters(Generic[P]):
     def __init__(self, named: P) -> None:
         self.named = named
         self.row = np.array(_numbers(named))
-
-    def extended(self, form: Callable[..., Q], *others: Any) -> KernelParameters[Q]:
-        """Return the parameters `form(named, *others)`, a named tuple that begins with these."""
-        return KernelParameters(form(self.named, *others))
 
 
 def _numbers(named: tuple[Any, ...]) -> list[float]:

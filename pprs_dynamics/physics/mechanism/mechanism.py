@@ -23,7 +23,6 @@ from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, i
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
 from pprs_dynamics.physics.mechanism.places import MECHANISM, SLIDE, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
@@ -111,7 +110,10 @@ class Mechanism:
     @cached_property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """Joints and rotating loops without a drive."""
-        return passive_joints(self.structure, self.radii)
+        return tuple(PassiveJoint(name, self.radii.get(name, 0.0),
+                                  row < 0 or bool(self.structure.tables.turns[row]), row >= 0)
+                     for name, (row, _) in self.structure.friction_rows.items()
+                     if name not in self.drives)
 
     @property
     def tool_place(self) -> BodyPlace:
@@ -138,8 +140,31 @@ class Mechanism:
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        ) -> JointFriction:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
-        return friction_table(self.structure, blocks, reversal)
+        """Return friction of joints as `MechanismState.against_friction` takes it.
+
+        Parameters
+        ----------
+        blocks : mapping of str to mapping
+            `viscous`, `torque`, `coulomb` and `radius` by joint; 0 where one is left out, but the
+            radius of a slide, which is 1.
+        reversal : Reversal
+            In drives by their velocity, in all others by their rate, or that of slides.
+        """
+        structure = self.structure
+        widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
+                          strict=True))
+        rows = structure.friction_rows
+        joint, loop = (np.array([rows[name][side] for name in blocks], dtype=np.int64)
+                       for side in (0, 1))
+        viscous, torque, coulomb = (
+            np.array([float(block.get(key, 0.0)) for block in blocks.values()])
+            for key in ('viscous', 'torque', 'coulomb'))
+        slides = [row >= 0 and not structure.tables.turns[row] for row in joint]
+        radius = np.array([1.0 if slide else float(block.get('radius', 0.0))
+                           for slide, block in zip(slides, blocks.values(), strict=True)])
+        return JointFriction(joint, loop, viscous, torque, coulomb * radius,
+                             np.array([widths.get(name, reversal.slide if slide else reversal.rate)
+                                       for name, slide in zip(blocks, slides, strict=True)]))
 
     def with_body(self, link: str, parameters: Array) -> Mechanism:
         """Return the mechanism with a body more on a link.

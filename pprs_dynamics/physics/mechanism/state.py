@@ -139,7 +139,7 @@ class MechanismState(JointMotion):
     robot : Robot
     reversal : Reversal
     load : StructureLoad, optional
-    known : LinkMotion or PlatformKinematics, optional
+    known : LinkMotion or ClosedForm, optional
         The kinematics, where they are known.
     friction : JointFriction
         The model's own, which is computed together with the efforts.
@@ -178,7 +178,7 @@ class MechanismState(JointMotion):
 
     @lazy
     def links(self) -> Any:
-        """The kinematics: a `LinkMotion`, or a `PlatformKinematics` of the closed form."""
+        """The kinematics: a `LinkMotion`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.kinematics(self) if self.known is None else self.known
 
     @property
@@ -190,7 +190,7 @@ class MechanismState(JointMotion):
 
     @lazy
     def reactions(self) -> Any:
-        """Frictionless efforts and reactions: `Loads`, or a `RigidBody` of the closed form."""
+        """Frictionless efforts and reactions: `Loads`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.loads(self.links, self.load)
 
     @lazy

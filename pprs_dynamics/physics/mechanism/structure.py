@@ -19,7 +19,13 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.mechanism.closures import ROWS, Closing, Mobility
+from pprs_dynamics.physics.mechanism.closures import (
+    ROWS,
+    Closing,
+    Mobility,
+    with_actuated_coordinates,
+    with_elimination_order,
+)
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -34,16 +40,13 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
     moved_along,
 )
-from pprs_dynamics.physics.mechanism.elimination import (
-    with_actuated_coordinates,
-    with_elimination_order,
-)
 from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
 from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
+ROTATING = ('spherical', 'revolute', 'universal')  # closures whose friction is one of turns
 SPIN = 0.02  # weight of how far a centre of mass moves when a held coordinate does
 
 
@@ -154,6 +157,15 @@ class Structure:
     def held(self) -> tuple[str, ...]:
         """Coordinates that neither drives nor loops determine: they stand."""
         return tuple(self.coordinates[c] for c in self.mobility.held)
+
+    @property
+    def friction_rows(self) -> dict[str, tuple[int, int]]:
+        """Joints that move and rotating loops: row of the joint or -1, number of the loop or -1."""
+        held = set(self.mobility.held.tolist())
+        joints = {name: (row, -1) for name, row in self.rows.items()
+                  if int(self.tables.coordinate[row]) not in held}
+        return joints | {loop.name: (-1, k) for k, loop in enumerate(self.loops)
+                         if loop.kind in ROTATING}
 
     @property
     def passive(self) -> tuple[str, ...]:

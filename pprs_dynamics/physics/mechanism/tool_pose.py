@@ -18,12 +18,13 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.closures import RANK, ROWS
-from pprs_dynamics.physics.mechanism.description import Frame
-from pprs_dynamics.physics.mechanism.elimination import (
+from pprs_dynamics.physics.mechanism.closures import (
+    RANK,
+    ROWS,
     with_actuated_coordinates,
     with_elimination_order,
 )
+from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion

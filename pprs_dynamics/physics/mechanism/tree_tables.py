@@ -119,7 +119,7 @@ class Model(NamedTuple):
     starts : (passive + 1, 3) int array
         Where lists begin in `swap`, `below` and `right`.
     swap, below, right : int arrays
-        The order in which J_p is eliminated; see `elimination`.
+        The order in which J_p is eliminated; see `closures`.
     """
 
     joints: Integers

@@ -179,7 +179,7 @@ class DriveModel:
     @property
     def units(self) -> tuple[DriveUnits, ...]:
         """Units of the drives' quantities."""
-        return tuple(DriveUnits(name in self.robot.turning) for name in self.drives)
+        return self.limits.units
 
     @property
     def gain(self) -> tuple[float, ...] | None:

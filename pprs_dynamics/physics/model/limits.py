@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import LimitError, WorkspaceError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 
@@ -26,7 +27,8 @@ class DriveLimits:
 
     Parameters
     ----------
-    drives, position_units, effort_units : tuple of D str
+    drives : tuple of D str
+    units : tuple of D DriveUnits
     lower, upper : (D,) arrays
         Lowest and highest position of each drive [m, rad].
     efforts : (D,) array
@@ -38,8 +40,7 @@ class DriveLimits:
     """
 
     drives: tuple[str, ...]
-    position_units: tuple[str, ...]
-    effort_units: tuple[str, ...]
+    units: tuple[DriveUnits, ...]
     lower: Array
     upper: Array
     efforts: Array
@@ -83,7 +84,7 @@ class DriveLimits:
         outside = ~((positions >= lower) & (positions <= upper))
         if np.any(outside):
             sample, drive = (int(i) for i in np.argwhere(outside)[0])
-            unit = self.position_units[drive]
+            unit = self.units[drive].position
             raise WorkspaceError(
                 sample,
                 f'{self.drives[drive]} would have to be at {positions[sample, drive]:.6g} {unit}',
@@ -95,7 +96,7 @@ class DriveLimits:
         if np.any(over):
             sample, drive = (int(i) for i in np.argwhere(over)[0])
             raise LimitError(sample, self.drives[drive], float(forces[sample, drive]),
-                             float(self.efforts[drive]), self.effort_units[drive],
+                             float(self.efforts[drive]), self.units[drive].effort,
                              self.effort_source)
 
 

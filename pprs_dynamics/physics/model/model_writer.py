@@ -14,11 +14,10 @@ column and lists over several lines. It also writes 1e-05, which is a word for Y
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -53,9 +52,7 @@ WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is p
 INDENT = '  '
 DEPTH = 2  # of the keys, below /** and ros__parameters
 COMMENT_COLUMN = 46
-# Words that YAML would take for something else, and those that need no quotes.
-PLAIN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
-NOT_PLAIN = {'true', 'false', 'yes', 'no', 'on', 'off', 'null', 'y', 'n', 'nan', 'inf'}
+NOT_PLAIN = {'y', 'n', 'nan', 'inf'}  # words for YAML 1.1, not for ROS 2
 
 
 def write_model(path: str | PathLike[str], values: Mapping[str, Any],
@@ -323,31 +320,22 @@ def _comment(key: str, keys: Mapping[str, Key]) -> str:
     return ''
 
 
+class _Scalars(yaml.SafeDumper):
+    """Writer of values as ROS 2 and YAML 1.1 read them alike."""
+
+    def represent_word(self, word: str) -> yaml.Node:
+        """Return a word, quoted where ROS 2 might take it for a number or for true or false."""
+        style = None if word.isidentifier() and word.lower() not in NOT_PLAIN else '"'
+        return self.represent_scalar('tag:yaml.org,2002:str', word, style=style)
+
+
+_Scalars.add_representer(str, _Scalars.represent_word)
+
+
 def _value(value: Any) -> str:
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f'[{", ".join(_value(element) for element in value)}]'
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    if isinstance(value, float):
-        return _number(value)
-    if isinstance(value, int) or value is None:
-        return 'null' if value is None else str(value)
-    if isinstance(value, str) and PLAIN.fullmatch(value) and value.lower() not in NOT_PLAIN:
-        return value
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _number(value: float) -> str:
-    """Return the shortest text that gives this very number, and never a whole one."""
-    if not math.isfinite(value):
-        return '.nan' if math.isnan(value) else '.inf' if value > 0 else '-.inf'
-    text = repr(value)
-    mantissa, e, exponent = text.partition('e')
-    if not e:
-        return text
-    # 1e-05 is a number for ROS 2 and a word for YAML 1.1; 1.0e-05 is a number for both.
-    sign = '' if exponent[0] in '+-' else '+'
-    return f'{mantissa if "." in mantissa else mantissa + ".0"}e{sign}{exponent}'
+    text: str = yaml.dump(as_list(value), Dumper=_Scalars, default_flow_style=True,
+                          width=math.inf, allow_unicode=True)
+    return text.removesuffix('\n').removesuffix('\n...')
 
 
 def _verified(text: str, values: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.drives import COUNT, DRIVES
+from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
@@ -52,7 +52,7 @@ def read_platform(values: Mapping[str, Any],
 def platform_limits(values: Mapping[str, Any]) -> DriveLimits:
     """Return the strokes and efforts in the values of a 3-PPRS."""
     lower, upper = np.array([values[key] for key in STROKES]).T
-    return DriveLimits(DRIVES, ('m',) * COUNT, ('N',) * COUNT, lower, upper,
+    return DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
                        np.array(values['limits.effort']), STROKES, 'limits.effort')
 
 

@@ -27,7 +27,6 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
@@ -70,10 +69,9 @@ def read_mechanism(values: dict[str, Any], folder: Path,
 
 def joint_limits(structure: Structure) -> DriveLimits:
     """Return the ranges and efforts that a description has; infinite where it has none."""
-    units = [DriveUnits(kind == REVOLUTE) for kind in structure.kinds]
+    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
     return DriveLimits(
-        structure.drives, tuple(one.position for one in units), tuple(one.effort for one in units),
-        structure.lower, structure.upper, structure.effort,
+        structure.drives, units, structure.lower, structure.upper, structure.effort,
         ('its range in the URDF',) * len(units), 'the effort limit of URDF or node')
 
 
@@ -240,7 +238,7 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
 def passive_friction(structure: Structure, values: Mapping[str, Any],
                      ) -> Iterator[ModelJointFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
-    blocks, rows = _blocks_below(values, JOINTS), friction_rows(structure)
+    blocks, rows = _blocks_below(values, JOINTS), structure.friction_rows
     for name in blocks:
         if name not in rows:
             raise UnknownNameError('joint', name, rows, 'friction.joints')

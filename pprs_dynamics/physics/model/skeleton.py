@@ -77,10 +77,10 @@ class Skeleton:
 
 def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
     geometry, strokes = model.robot.geometry, model.values['limits.slide_stroke']
-    found, frames = model.robot.state(motion, model.reversal).links, geometry.frames
+    found = model.robot.state(motion, model.reversal).links
     slide, lift = np.split(found.position, 2, axis=1)
     R, l = np.full_like(slide, geometry.base_radius), geometry.rod_length  # noqa: E741
-    feet, elbows, tips = (frames.base(ChainVector(*point)) for point in (
+    feet, elbows, tips = (geometry.in_base(ChainVector(*point)) for point in (
         (R, slide, 0 * lift), (R, slide, lift),
         (R - l * found.cos_u, slide, lift + l * found.sin_u)))
     points: list[Array] = []
@@ -89,8 +89,8 @@ def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
     labels: dict[str, int] = {}
     for i in range(3):
         foot, elbow, tip = feet[:, i], elbows[:, i], tips[:, i]
-        along = np.array([-frames.sin[i], frames.cos[i], 0.0])
-        middle = geometry.base_radius * np.array([frames.cos[i], frames.sin[i], 0.0])
+        along = np.array([-geometry.sin[i], geometry.cos[i], 0.0])
+        middle = geometry.base_radius * np.array([geometry.cos[i], geometry.sin[i], 0.0])
         half = SLIDE * geometry.base_radius * along
         first = len(points)
         points += [np.broadcast_to(middle + end * along, foot.shape) for end in strokes]

@@ -68,7 +68,7 @@ class ForcesParameters(NamedTuple):
     drives: tuple[DriveFriction, ...]
 
 
-FRICTIONLESS = Joints(1.0, 0.0), (DriveFriction(0.0, 0.0, 1.0),) * 6
+FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES = Joints(1.0, 0.0), (DriveFriction(0.0, 0.0, 1.0),) * 6
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, parts: Any) -> Any:

@@ -19,26 +19,6 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryPa
 ELBOWS = ('up', 'down')
 
 
-class ChainFrames:
-    """The three chain frames (e_i, n_i, k) in `base`.
-
-    Parameters
-    ----------
-    angles : sequence of 3 floats
-        Chain angles delta_i [rad].
-    """
-
-    def __init__(self, angles: tuple[float, float, float]) -> None:
-        self.cos = np.cos(angles)
-        self.sin = np.sin(angles)
-
-    def base(self, vector: ChainVector) -> Array:
-        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
-        result = np.empty((*np.shape(vector.e), 3))
-        result[..., 0], result[..., 1], result[..., 2] = in_base(self, vector)
-        return result
-
-
 @dataclass(frozen=True)
 class Geometry:
     """Lengths and angles of the mechanism.
@@ -78,19 +58,28 @@ class Geometry:
         return 1.0 if self.elbow == 'up' else -1.0
 
     @cached_property
-    def frames(self) -> ChainFrames:
-        """The frames of the chains."""
-        return ChainFrames(self.chain_angles)
+    def cos(self) -> Array:
+        """Cosines of the chain angles, (3,)."""
+        return np.cos(self.chain_angles)
+
+    @cached_property
+    def sin(self) -> Array:
+        """Sines of the chain angles, (3,)."""
+        return np.sin(self.chain_angles)
+
+    def in_base(self, vector: ChainVector) -> Array:
+        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
+        return np.stack(in_base(self, vector), axis=-1)
 
     @cached_property
     def kernel_parameters(self) -> GeometryParameters:
         """Lengths and the constants of the chains."""
-        frames, delta = self.frames, np.asarray(self.chain_angles)
+        delta = np.asarray(self.chain_angles)
         joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
-        left = np.linalg.pinv(np.stack((-frames.sin, frames.cos), axis=1))
+        left = np.linalg.pinv(np.stack((-self.sin, self.cos), axis=1))
         # The weights with which the three directions n_i add up to nothing.
         balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
-        constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
+        constants = np.stack((self.cos, self.sin, joints.real, joints.imag, *left, balance),
                              axis=1).tolist()
         first, second, third = (Chain(*chain) for chain in constants)
         return GeometryParameters(self.base_radius, self.rod_length, self.elbow_sign,

@@ -127,7 +127,7 @@ class IndependentChainsFriction(PassiveFriction):
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
         found, geometry = state.reactions, state.reactions.robot.geometry
         k_r, k_s = found.resistances(self.joints(state.reversal))
-        omega_n = relative_rate(found.u_dot, in_chain(geometry.frames, Vector(
+        omega_n = relative_rate(found.u_dot, in_chain(geometry, Vector(
             *state.motion.angular_velocity.T[..., None])))
         lever = geometry.rod_length * found.cos_u
         sign = -1.0 if self.printed else 1.0

@@ -34,7 +34,7 @@ from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS, DriveFriction
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveFriction
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
@@ -86,12 +86,12 @@ class ClosedForm:
         In addition to bodies and gravity.
     joints : Joints
         Friction of the passive joints.
-    table : (closed_form.EVERYTHING, N, 6) array, optional
+    table : (EVERYTHING, N, 6) array, optional
         The results, where they are known.
     """
 
     def __init__(self, robot: ThreePprs, motion: PlatformMotion,
-                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS[0],
+                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS_JOINTS,
                  table: Array | None = None) -> None:
         self.robot, self.motion, self.load = robot, motion, load
         self.is_regular = True
@@ -102,9 +102,9 @@ class ClosedForm:
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
             table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+            parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
             self.is_regular = evaluate(
-                closed_form.forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
-                                       motion.rows, loads, table) < 0
+                closed_form.forces_kernel, parameters, motion.rows, loads, table) < 0
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
@@ -264,7 +264,7 @@ class ThreePprs:
     @property
     def numbers(self) -> Array:
         """All numbers that determine the forces, in one row."""
-        return self.kernel_parameters.row
+        return KernelParameters(self.kernel_parameters).row
 
     @property
     def position_step(self) -> float:
@@ -297,23 +297,22 @@ class ThreePprs:
         return replace(self, masses=altered)
 
     @cached_property
-    def kernel_parameters(self) -> KernelParameters[RobotParameters]:
+    def kernel_parameters(self) -> RobotParameters:
         """Geometry, masses and gravity."""
         masses = self.masses
         first, second, third = (ChainMasses(*chain) for chain in zip(
             masses.slides, masses.lifts, masses.rods, strict=True))
         body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
                             Vector(*masses.inertia[3:]))
-        return KernelParameters(RobotParameters(
-            self.geometry.kernel_parameters, body, (first, second, third),
-            Vector(*self.gravity)))
+        return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
+                               Vector(*self.gravity))
 
     def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
                    ) -> KernelParameters[closed_form.ForcesParameters]:
         """Return the parameters of `forces_kernel` with friction of joints and drives."""
-        return self.kernel_parameters.extended(
-            closed_form.ForcesParameters, self.geometry.platform_radius, float(self.printed),
-            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives)
+        return KernelParameters(closed_form.ForcesParameters(
+            self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
+            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives))
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
                      ) -> Mechanism:

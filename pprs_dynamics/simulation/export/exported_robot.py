@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import (
     FLOATING,
     Frame,
@@ -123,8 +122,7 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     ModelError
         For bodies that no real ones are, and closures that no format has.
     """
-    model = expressed.model
-    robot = with_bodies(model.robot, model.effects)
+    model, robot = expressed.model, expressed.robot
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
     limits = model.limits

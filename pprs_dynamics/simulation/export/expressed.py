@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What of a model a simulator's format can hold: a model with no more than that, and the rest.
+"""The parts of a model that a simulator's format can hold, and names of the others.
 
 A joint of URDF has viscous and dry friction; one of MJCF a rotor's inertia and a spring, too. Dry
 friction turns over at once there: with `sgn` for tanh(v / width).
@@ -9,7 +9,7 @@ friction turns over at once there: with `sgn` for tanh(v / width).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +24,6 @@ from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffec
 from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 
@@ -32,11 +31,9 @@ MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
 DAMPING, FRICTION, ARMATURE, STIFFNESS = 'damping', 'frictionloss', 'armature', 'stiffness'
 SPRINGREF = 'springref'
-ACTIVE = 'effects.active'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
-AT_ONCE = 1e-9  # [m/s, rad/s], a width of turning over above rounding and below any motion
 HINGES = ('hinge_1', 'hinge_2', 'hinge_3')  # C_i of the 3-PPRS
 # Of effects on drives: their parameters as a joint's.
 OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
@@ -47,6 +44,8 @@ OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
 }
 OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
               'position': SPRINGREF}
+# By joint, the numbers that a format names.
+Joints = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,9 @@ class Expressed:
     Parameters
     ----------
     model : DriveModel
-        With no more than the format holds; dry friction turns over at once.
+        The whole one.
+    robot : Mechanism or ThreePprs
+        With the bodies and the gravity that the format holds.
     joints : dict of str to dict of str to float
         Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
         it has them.
@@ -65,93 +66,9 @@ class Expressed:
     """
 
     model: DriveModel
-    joints: dict[str, dict[str, float]]
+    robot: Any
+    joints: Joints
     not_expressed: tuple[str, ...]
-
-
-class _Sorting:
-    """Sorts what a model has into what a format holds and what it does not."""
-
-    def __init__(self, model: DriveModel, kind: str) -> None:
-        self.model, self.kind, self.held = model, kind, HELD[kind]
-        self.loops = [loop.name for loop in model.robot.structure.loops] if (
-            model.moves_joints) else []
-        # Joints of a format that passive joints of the model are; those without do not turn alone.
-        self.passive = {
-            one.name: (one.name,) if model.moves_joints else HINGES
-            for one in model.robot.passive_joints if one.has_position}
-        self.joints: dict[str, dict[str, float]] = {}
-        self.left: list[str] = []
-        self.values = dict(model.values)
-
-    def take(self, joints: Mapping[str, Mapping[str, float]]) -> bool:
-        """Add numbers to joints; False, with nothing added, where the format cannot hold them."""
-        after = {name: dict(numbers) for name, numbers in self.joints.items()}
-        for name, numbers in joints.items():
-            own = after.setdefault(name, {})
-            for key, value in numbers.items():
-                if value and key not in self.held:
-                    return False
-                own[key] = own.get(key, 0.0) + value
-                # No simulator takes a joint that gives power without end.
-                if key != SPRINGREF and own[key] < 0:
-                    return False
-        self.joints = after
-        return True
-
-    def keep(self, key: str, joints: Sequence[str], number: str) -> None:
-        """Take the numbers of a key of the model file as joints have them, or drop them."""
-        spread = np.broadcast_to(np.asarray(self.values[key], dtype=float), len(joints)).tolist()
-        if not self.take({name: {number: value}
-                          for name, value in zip(joints, spread, strict=True)}):
-            self.drop(key)
-
-    def drop(self, key: str) -> None:
-        """Set the numbers of a key to 0, and note it where they were not."""
-        if np.any(self.values[key]):
-            self.exchange(key, np.multiply(self.values[key], 0.0).tolist())
-
-    def exchange(self, key: str, value: Any) -> None:
-        """Give a key another value, and note it where that changes anything."""
-        if self.values[key] != value:
-            self.values[key] = value
-            self.left.append(key)
-
-    def add(self, effect: Effect) -> None:
-        """Sort an added effect."""
-        if not self._holds(effect):
-            self.left.append(effect.name)
-            self.values = {key: value for key, value in self.values.items()
-                           if not key.startswith(f'effects.{effect.name}.')}
-            self.values[ACTIVE] = [name for name in self.values[ACTIVE] if name != effect.name]
-
-    def _holds(self, effect: Effect) -> bool:
-        if type(effect) in OF_DRIVES:
-            assert isinstance(effect, DriveEffect)
-            names = OF_DRIVES[type(effect)]
-            return self.take({drive: {names[key]: value for key, value in values.items()}
-                              for drive, values in effect.drives.items()})
-        if isinstance(effect, (JointFrictionEffect, JointSpring)):
-            return self._holds_in_joints(effect.values)
-        # A change of bodies and no force beside them; in URDF, which has none, not of gravity.
-        return isinstance(effect, BodyEffect) and (
-            type(effect).load is BodyEffect.load and type(effect).apply is BodyEffect.apply) and (
-                self.kind == MJCF or not self._turns_gravity(effect))
-
-    def _turns_gravity(self, effect: BodyEffect) -> bool:
-        robot = self.model.robot
-        return bool(np.any(np.subtract(effect.changed(robot).gravity, robot.gravity)))
-
-    def _holds_in_joints(self, values: Mapping[str, float]) -> bool:
-        """Sort what is in passive joints, by `<joint>.<parameter>`: all of it or none."""
-        joints: dict[str, dict[str, float]] = {}
-        for key, value in values.items():
-            joint, _, parameter = key.rpartition('.')
-            if value and (joint not in self.passive or parameter not in OF_PASSIVE):
-                return False
-            for one in self.passive.get(joint, ()) if value else ():
-                joints.setdefault(one, {})[OF_PASSIVE[parameter]] = value
-        return self.take(joints)
 
 
 def express(model: DriveModel, kind: str) -> Expressed:
@@ -162,50 +79,106 @@ def express(model: DriveModel, kind: str) -> Expressed:
     model : DriveModel
     kind : {'urdf', 'mjcf'}
     """
-    sorting = _Sorting(model, kind)
-    (_sort_arm if model.moves_joints else _sort_platform)(model, sorting)
+    joints: Joints = {}
+    left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
+            if not _take(joints, numbers, HELD[kind])]
+    # Joints of a format that passive joints of the model are; those without do not turn alone.
+    passive = {one.name: (one.name,) if model.moves_joints else HINGES
+               for one in model.robot.passive_joints if one.has_position}
+    robot = model.robot
     for effect in model.effects:
-        if effect.name in model.values.get(ACTIVE, ()):
-            sorting.add(effect)
-    if kind == URDF:
-        _under_standard_gravity(model, sorting)
-        sorting.left += sorting.loops if model.moves_joints else ['ball_2', 'ball_3']
-    reduced = replace(DriveModel.from_parameters(sorting.values, model.source),
-                           reversal=Reversal(AT_ONCE, AT_ONCE, AT_ONCE))
-    return Expressed(reduced, {name: {key: value for key, value in numbers.items() if value}
-                               for name, numbers in sorting.joints.items()},
-                     tuple(sorting.left))
-
-
-def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
-    """Sort the paper's friction, whose loads no format has, and take the exact equations."""
-    sorting.keep('friction.drives.viscous', model.drives, DAMPING)
-    sorting.keep('friction.revolute.viscous', HINGES, DAMPING)
-    sorting.drop('friction.drives.coulomb')
-    for joint in ('revolute', 'spherical'):
-        if model.values[f'friction.{joint}.diameter']:
-            sorting.drop(f'friction.{joint}.coulomb')
-    sorting.drop('friction.spherical.viscous')
-    sorting.exchange('friction.approach', WholeMechanismFriction.approach)
-    sorting.exchange('equations', 'corrected')
-
-
-def _sort_arm(model: DriveModel, sorting: _Sorting) -> None:
-    """Sort rotors and friction, also of passive joints; of these no loads."""
-    sorting.keep('friction.viscous', model.drives, DAMPING)
-    sorting.keep('friction.coulomb', model.drives, FRICTION)
-    sorting.drop('friction.offset')
-    sorting.keep('robot.armature', model.drives, ARMATURE)
-    for key in model.values:
-        name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
-        if not key.startswith('friction.joints.') or parameter == 'radius':
+        if effect.name not in model.values.get('effects.active', ()):
             continue
-        if name in sorting.loops or parameter not in OF_PASSIVE:
-            sorting.drop(key)
-        else:
-            sorting.keep(key, (name,), OF_PASSIVE[parameter])
+        if _is_body(effect, kind, robot):
+            assert isinstance(effect, BodyEffect)
+            robot = effect.changed(robot)
+        elif not _take(joints, _of_effect(effect, passive), HELD[kind]):
+            left.append(effect.name)
+    if kind == URDF:
+        if tuple(model.robot.gravity) != STANDARD_GRAVITY:
+            left.append('robot.gravity' if model.moves_joints else 'gravity')
+        robot = replace(robot, gravity=STANDARD_GRAVITY)
+        left += ([loop.name for loop in model.robot.structure.loops] if model.moves_joints
+                 else ['ball_2', 'ball_3'])
+    return Expressed(model, robot, {
+        name: {key: value for key, value in numbers.items() if value}
+        for name, numbers in joints.items()}, tuple(left))
 
 
-def _under_standard_gravity(model: DriveModel, sorting: _Sorting) -> None:
-    """Take the gravity that is assumed where a file has none."""
-    sorting.exchange('robot.gravity' if model.moves_joints else 'gravity', STANDARD_GRAVITY)
+def _take(joints: Joints, numbers: Joints | None, held: set[str]) -> bool:
+    """Add numbers to joints; False, with nothing added, where the format cannot hold them."""
+    if numbers is None:
+        return False
+    added = {name: {key: value + joints.get(name, {}).get(key, 0.0)
+                    for key, value in own.items() if value} for name, own in numbers.items()}
+    # No simulator takes a joint that gives power without end.
+    if any(key not in held or (value < 0 and key != SPRINGREF)
+           for own in added.values() for key, value in own.items()):
+        return False
+    for name, own in added.items():
+        joints.setdefault(name, {}).update(own)
+    return True
+
+
+def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+    """Yield keys of the paper's friction and their numbers; None for loads, which no format has."""
+    values = model.values
+    yield 'friction.drives.viscous', _spread(model, 'friction.drives.viscous', DAMPING)
+    yield ('friction.revolute.viscous',
+           {name: {DAMPING: values['friction.revolute.viscous']} for name in HINGES})
+    for key in ('friction.drives.coulomb', *(
+            f'friction.{joint}.coulomb' for joint in ('revolute', 'spherical')
+            if values[f'friction.{joint}.diameter']), 'friction.spherical.viscous'):
+        if np.any(values[key]):
+            yield key, None
+    if values['friction.approach'] != WholeMechanismFriction.approach:
+        yield 'friction.approach', None
+    if values['equations'] != 'corrected':
+        yield 'equations', None
+
+
+def _of_arm(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+    """Yield keys of rotors and friction, also of passive joints; None for those of no format."""
+    yield 'friction.viscous', _spread(model, 'friction.viscous', DAMPING)
+    yield 'friction.coulomb', _spread(model, 'friction.coulomb', FRICTION)
+    if np.any(model.values['friction.offset']):
+        yield 'friction.offset', None
+    yield 'robot.armature', _spread(model, 'robot.armature', ARMATURE)
+    loops = {loop.name for loop in model.robot.structure.loops}
+    for key, value in model.values.items():
+        name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
+        if key.startswith('friction.joints.') and parameter != 'radius' and value:
+            number = None if name in loops else OF_PASSIVE.get(parameter)
+            yield key, None if number is None else {name: {number: value}}
+
+
+def _spread(model: DriveModel, key: str, number: str) -> Joints:
+    """Return the numbers of all drives, or the number that is the same in all."""
+    values = np.broadcast_to(np.asarray(model.values[key], dtype=float), len(model.drives))
+    return {drive: {number: value}
+            for drive, value in zip(model.drives, values.tolist(), strict=True)}
+
+
+def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Joints | None:
+    """Return the numbers of an effect in drives or passive joints, None where it has others."""
+    if isinstance(effect, DriveEffect) and type(effect) in OF_DRIVES:
+        names = OF_DRIVES[type(effect)]
+        return {drive: {names[key]: value for key, value in values.items()}
+                for drive, values in effect.drives.items()}
+    if not isinstance(effect, (JointFrictionEffect, JointSpring)):
+        return None
+    joints: Joints = {}
+    for key, value in effect.values.items():
+        joint, _, parameter = key.rpartition('.')
+        if value and (joint not in passive or parameter not in OF_PASSIVE):
+            return None
+        for name in passive.get(joint, ()) if value else ():
+            joints.setdefault(name, {})[OF_PASSIVE[parameter]] = value
+    return joints
+
+
+def _is_body(effect: Effect, kind: str, robot: Any) -> bool:
+    """Return whether an effect changes bodies and adds no force; in URDF, not gravity either."""
+    return (isinstance(effect, BodyEffect) and type(effect).load is BodyEffect.load
+            and type(effect).apply is BodyEffect.apply
+            and (kind == MJCF or effect.changed(robot).gravity == robot.gravity))

@@ -22,12 +22,13 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
-from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
+from pprs_dynamics.simulation.export.expressed import MJCF
 from pprs_dynamics.simulation.export.writers import closures
 from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
 DURATION, RATE = 8.0, 100.0  # [s, Hz]
+AT_ONCE = 1e-9  # [m/s, rad/s], a width of turning over above rounding and below any motion
 
 
 def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion) -> Array:
@@ -77,8 +78,6 @@ class Replayed:
         Of their efforts.
     error : (D,) array
         Root mean square of the model's efforts less those of the file [N, N m].
-    expected : (D,) array
-        The same by the model's own equations: of what the file does not express.
     effort : (D,) array
         Root mean square of the model's efforts.
     """
@@ -86,27 +85,22 @@ class Replayed:
     drives: tuple[str, ...]
     units: tuple[str, ...]
     error: Array
-    expected: Array
     effort: Array
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
         return {'replay_error': root_mean_square(self.error),
-                'expected_error': root_mean_square(self.expected),
                 'effort': root_mean_square(self.effort)}
 
 
-def replay(model: DriveModel, expressed: Expressed, robot: ExportedRobot, text: str, kind: str,
-           ) -> Replayed:
+def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Replayed:
     """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
     state, motion = model.initial_state(), _excitation(model)
     forces = model.measured(model.drive_forces(motion, state), state)
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
-    error, expected, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
-        forces.total - by_file, forces.total - expressed.model.drive_forces(motion).total,
-        forces.total))
-    return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
-                    effort)
+    error, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
+        forces.total - by_file, forces.total))
+    return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, effort)
 
 
 def _excitation(model: DriveModel) -> Any:

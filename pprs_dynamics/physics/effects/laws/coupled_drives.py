@@ -93,5 +93,4 @@ def _in_motors(motors: tuple[tuple[str, tuple[float, ...]], ...]) -> type[Couple
         variants += [(viscous,), (coulomb,), (viscous, coulomb)]
     return type('CoupledDrives', (CoupledDrives,), {
         'linear': tuple(linear), 'variants': tuple(variants), 'maps': dict(motors),
-        'unphysical_below': {one.name: 0.0 for one in linear}, '__module__': __name__,
-        'made_by': (_in_motors, (motors,))})
+        '__module__': __name__, 'made_by': (_in_motors, (motors,))})

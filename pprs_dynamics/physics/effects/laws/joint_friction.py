@@ -89,7 +89,7 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
     Of joints that are alike the first represents all, whatever the load; a drive for friction
     of its own.
     """
-    linear, variants, bounds = [], [], {}
+    linear, variants = [], []
     stand_ins = {name for group in alike for name in group[1:]}
     for name, _ in joints:
         linear += [
@@ -103,11 +103,9 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
             variants += [(f'{name}.viscous',), (f'{name}.torque',),
                          (f'{name}.viscous', f'{name}.torque')]
         variants.append((f'{name}.coulomb',))
-        bounds.update({f'{name}.{last}': 0.0 for last in ('viscous', 'torque', 'coulomb')})
     return type('JointFrictionEffect', (JointFrictionEffect,), {
         'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
-        'unphysical_below': bounds, 'alike': alike, '__module__': __name__,
-        'made_by': (_in_joints, (joints, alike))})
+        'alike': alike, '__module__': __name__, 'made_by': (_in_joints, (joints, alike))})
 
 
 class ModelJointFriction(Effect):
