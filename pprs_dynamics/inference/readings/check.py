@@ -102,7 +102,7 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     if found := tuple(find_sign_bit(recording)):
         return found
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
-                if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
+                if (excerpt := excerpt_of(recording, table.STRETCHES, unit)) is not None}
     if wrong := [*_of_rate(model, recording, excerpts.get(1.0))]:
         return tuple(wrong)
     search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
