@@ -64,7 +64,6 @@ class MechanismEngine:
 
     def __init__(self, model: DriveModel) -> None:
         self.engine = mujoco = load_engine()
-        self.model_file = model
         robot = self.robot = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)

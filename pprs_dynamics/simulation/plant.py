@@ -25,9 +25,10 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.engine import SLOWEST, MechanismEngine
+from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injected_forms import (
     FORMS,
     UNKNOWN,
@@ -125,12 +126,16 @@ class Plant(Injecting):
         self.largest = np.abs(self._efforts).max(axis=0)
         self._guides = sorted(guides(self.model), key=s.drives.index)
         reversal = self.model.reversal
-        self._viscous, self._coulomb, self._offset = (
+        viscous, coulomb, self._offset = (
             np.broadcast_to(np.asarray(numbers, dtype=float), len(s.drives)) for numbers in (
                 self.model.friction.viscous, self.model.friction.coulomb, self.model.offset.value))
         self._width = reversal.widths(len(s.drives))
-        self._passive = [effect.table(self.model.robot, reversal) for effect in self.model.effects
-                         if isinstance(effect, ModelJointFriction)]
+        of_drives = self.model.robot.friction_table(
+            {drive: {'viscous': viscous[d], 'torque': coulomb[d]}
+             for d, drive in enumerate(s.drives)}, reversal)
+        self._friction = JointFriction(*map(np.concatenate, zip(of_drives, *(
+            effect.table(self.model.robot, reversal) for effect in self.model.effects
+            if isinstance(effect, ModelJointFriction)), strict=True)))
         self.inject(names, seed, scale)
         home, _ = s.room(np.pi)  # where motions that are drawn begin
         self.limits = self.model.limits
@@ -313,21 +318,9 @@ class Plant(Injecting):
         if self._guides and self._pushes:
             self._pressed[[self.structure.drives.index(name) for name in self._guides]] = (
                 np.linalg.norm(self.engine.across(self._guides, carried)[0], axis=1))
-        rubbing = [self.engine.friction(table, closed, carried) for table in self._passive]
-        count = len(position)
-        rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1),
-                *(each.rows[0] @ T for each in rubbing)]
-        ends = np.cumsum([len(each) for each in rows])
-
-        def coefficients(rates: Array) -> Array:
-            x = np.maximum(np.abs(rates[:count, 0]) / self._width, SLOWEST)
-            return np.concatenate((
-                self._viscous + self._coulomb * np.tanh(x) / (x * self._width),
-                *(each.coefficients(rates[None, start:end])[0] for each, start, end in zip(
-                    rubbing, ends[:-1], ends[1:], strict=True))))
-
+        rubbing = self.engine.friction(self._friction, closed, carried)
         return (mass + np.diag(self.model.robot.armature), self._load - mass @ acceleration,
-                np.concatenate(rows), coefficients)
+                rubbing.rows[0] @ T, lambda rates: rubbing.coefficients(rates[None])[0])
 
     def _hidden(self, position: Array, velocity: Array) -> tuple[Array, Array]:
         """Return injected forces that do not follow velocities, and slopes of those that do."""

@@ -73,7 +73,7 @@ def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     held = 4000
     position, effort = POSITION.copy(), EFFORT.copy()
     position[:held] = position[held]
-    excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort))
+    excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort), 3)
     assert excerpt is not None
     forces = forces_on(MODEL, excerpt.motion, excerpt.time)
     assert forces is not None

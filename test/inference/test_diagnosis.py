@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.mechanism.paths import HOME
+from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 
 MODEL = DriveModel.load()
 TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.05,
@@ -231,6 +231,23 @@ def test_what_no_effect_explains_is_told_with_its_variable(name: str, variable: 
     assert found.verdict == 'unknown'
     assert found.depends_on[0].drive in truth['effects'][0]['drives']
     assert found.depends_on[0].variable.startswith(variable)
+
+
+def test_a_drive_that_reverses_in_another_width_hides_no_friction() -> None:
+    effect = 'effects.stribeck_friction.slide_1.'
+    true = DriveModel.from_parameters({
+        **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0),
+        'effects.active': ['stribeck_friction'],
+        effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
+    recording = record(true, noise=0.05)
+    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2).motion)
+    found = diagnose(MODEL, [recording], [other])
+    (effect_found,) = found.effects
+    assert (found.verdict, effect_found.drives) == ('effect', ('slide_1',))
+    # The model that is judged on the other motion is the one that is adopted.
+    assert effect_found.held_out_after == pytest.approx(
+        np.sqrt(np.nanmean(measure_residuals(found.adopted, [other])[0].error ** 2)), rel=1e-6)
+    assert effect_found.held_out_after < 0.5 * effect_found.held_out_before
 
 
 @pytest.mark.filterwarnings('error')

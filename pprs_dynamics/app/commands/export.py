@@ -54,12 +54,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
+    screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
         ('drive', 'effort', 'error'),
         [(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
          for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
-                                         strict=True)],
-        title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
-        title_justify='left'))
+                                         strict=True)]))
     more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
     screen.print(f'not expressed: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

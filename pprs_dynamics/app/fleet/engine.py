@@ -85,8 +85,6 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
         elif client.status != 'running' or future.status != 'error':
             raise SchedulerError('the scheduler has stopped; what was written remains, and the '
                                  'same command does the rest')
-        elif isinstance(error := future.exception(), library.KilledWorker):
-            yield item, None, (f'its worker was killed {ALLOWED_FAILURES + 1} times, by the system '
-                               'or for lack of memory')
         else:
+            error = future.exception()
             yield item, None, f'{type(error).__name__}: {error}'

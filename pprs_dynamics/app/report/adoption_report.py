@@ -21,7 +21,13 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, verdict_panel
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
-from pprs_dynamics.inference.diagnosis.quantities import as_fitted, in_unit, plain, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import (
+    as_fitted,
+    in_unit,
+    plain,
+    with_drives,
+    with_uncertainty,
+)
 from pprs_dynamics.inference.diagnosis.sentences import sure_moments
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
@@ -68,12 +74,10 @@ def _held_out(answer: Adoption) -> str:
 
 def headline(answer: Adoption) -> str:
     """Return the answer in a sentence."""
-    on = f' on {", ".join(answer.drives)}' if answer.drives else ''
-    if not answer.adopted:
-        return f'{answer.effect}{on} is refused: {answer.reason}.'
-    if answer.forced:
-        return f'{answer.effect}{on} is adopted by force, in spite of this: {answer.reason}.'
-    return f'{answer.effect}{on} is adopted: {answer.reason}.'
+    what = with_drives(answer.effect, answer.drives, answer.before.drives)
+    said = ('is refused' if not answer.adopted else
+            'is adopted by force, in spite of this' if answer.forced else 'is adopted')
+    return f'{what} {said}: {answer.reason}.'
 
 
 def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,27 +16,16 @@ from pprs_dynamics.physics.model.skeleton import Skeleton
 MOST_POSES = 600
 
 
-@dataclass(frozen=True)
-class RobotMotion:
-    """F poses.
+def robot_motion(session: Session) -> tuple[Skeleton, dict[str, Array]]:
+    """Return F poses of all recordings, one after the other.
 
-    Parameters
-    ----------
-    time : (F,) array
-        Of the residuals [s].
-    skeleton : Skeleton
-    before, now : (F, D) array
-        Error of the drives there, rms over the samples until the next pose [N].
+    Returns
+    -------
+    drawn : Skeleton
+    arrays : dict of str to array
+        `time` of the residuals (F,) [s], the `points` of the skeleton, and the error of the drives
+        `before` and `now`, (F, D): rms over the samples until the next pose [N].
     """
-
-    time: Array
-    skeleton: Skeleton
-    before: Array
-    now: Array
-
-
-def robot_motion(session: Session) -> RobotMotion:
-    """Return the poses of all recordings, one after the other."""
     ticks = session.ticks
     data = ticks.fits.design.residuals
     chosen = np.unique(np.linspace(0, len(data) - 1, MOST_POSES).astype(int))
@@ -49,9 +38,9 @@ def robot_motion(session: Session) -> RobotMotion:
         if len(here):
             found.append(Skeleton.of(ticks.model, reconstruction.motion[starts[here]]))
     drawn = replace(found[0], points=np.concatenate([entry.points for entry in found]))
-    return RobotMotion(data.time[chosen], drawn,
-                       _rms_between(ticks.fits.before, chosen),
-                       _rms_between(ticks.view.residual, chosen))
+    return drawn, {'time': data.time[chosen], 'points': drawn.points,
+                   'before': _rms_between(ticks.fits.before, chosen),
+                   'now': _rms_between(ticks.view.residual, chosen)}
 
 
 def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:

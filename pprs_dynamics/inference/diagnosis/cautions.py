@@ -121,6 +121,7 @@ def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
         other = catalogue().get(effect.effect.at_one_load)
         if other is None or not issubclass(other, DriveEffect):
             continue
+        alike = []
         for name in effect.drives or ():
             d = fits.design.drives.index(name)
             rows = np.concatenate([fits.components.term(Component.of(
@@ -129,5 +130,7 @@ def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
             wanted, columns = effect.force[moving, d], rows[:, moving]
             rest = wanted - np.linalg.lstsq(columns.T, wanted, rcond=None)[0] @ columns
             if root_mean_square(rest) < share * root_mean_square(wanted):
-                yield (f'{effect.name} on {name} and {other.name} differ by less than {share:.0%}, '
-                       'because the load hardly varies. Record another load')
+                alike.append(name)
+        if alike:
+            yield (f'{effect.name} and {other.name} on {listed(alike)} differ by less than '
+                   f'{share:.0%}, because the load hardly varies. Record another load')

@@ -102,6 +102,8 @@ class Reference:
         Directions of unit variance of the base's numbers, those determined by the reference first.
     coefficients, root : (Q,) and (Q, Q) arrays
         Of determined directions, then of the processes of every drive; of their covariance.
+    told : int
+        How many directions of the base's numbers are determined.
     regression, fit : Regression, JointFit
     names : tuple of str
         Of the recordings, as they were given.
@@ -116,6 +118,7 @@ class Reference:
     base: Array
     coefficients: Array
     root: Array
+    told: int
     regression: Regression
     fit: JointFit
     names: tuple[str, ...] = ()
@@ -157,13 +160,7 @@ class Reference:
         parts = _parts(residuals)
         return cls(model, tuple(recordings), processes, size,
                    _repeats(regression, fit, told, parts), base, fit.coefficients,
-                   axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, names)
-
-    @property
-    def told(self) -> int:
-        """How many directions of the base's numbers it determines."""
-        shared, *own = (len(one) for one in self.processes)
-        return len(self.coefficients) - len(self.size) * shared - sum(own)
+                   axes * np.sqrt(np.maximum(values, 0.0)), told, regression, fit, names)
 
     @property
     def note(self) -> str:
@@ -185,13 +182,11 @@ class Reference:
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
                       ) -> CarriedOver:
         drives, told = range(len(self.size)), self.told
-        samples = len(residuals)
         q, v = motion_of(residuals)
-        features = [one.known(q, v, residuals.period) for one in self.processes]
-        shared, *own = ((known, one.new(q, v, known))
-                        for one, known in zip(self.processes, features, strict=True))
+        shared, *own = ((known, one.new(q, v, known)) for one, known in (
+            (one, one.known(q, v, residuals.period)) for one in self.processes))
         numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
-                   @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
+                   @ self.base if self.base.size else np.zeros((len(q), len(drives), 0)))
         of_base = numbers[..., :told] @ self.coefficients[:told]
         together, apart, at = [], [], told
         for d in drives:
@@ -200,35 +195,29 @@ class Reference:
             new = np.concatenate([size * one[1] for size, one in zip(
                 self.size[d], of_drive, strict=True)], axis=1)
             sizes = _sizes(self.size[d], [one[0] for one in of_drive])
-            place, repeats = slice(at, at + len(sizes)), self.repeats[d]
-            at = place.stop
-            rows = repeats * known
+            place, repeats = slice(at, at := at + len(sizes)), self.repeats[d]
             together.append(np.concatenate((
-                numbers[:, d, :told] @ self.root[:told] + rows @ self.root[place],
+                numbers[:, d, :told] @ self.root[:told] + repeats * known @ self.root[place],
                 numbers[:, d, told:]), axis=1))
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
 
-        shown = of_base + self._by_features(features)
-        return CarriedOver(of_base, self._repeating, *self._open(replace(
-            residuals, measured=residuals.measured - shown), together, apart), float(np.mean(
-                (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
+        left = residuals.measured - of_base - self._repeating(q, v, residuals.period)
+        return CarriedOver(
+            of_base, self._repeating,
+            *self._open(replace(residuals, measured=left), together, apart),
+            float(np.mean((shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
     def _repeating(self, q: Array, v: Array, period: float) -> Array:
         """Return what repeats in addition to the base, (M, D) [N]; see `Waves.known`."""
-        if len(q) > CHUNK:
-            return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
-                                   for at in range(0, len(q), CHUNK)])
-        return self._by_features([one.known(q, v, period) for one in self.processes])
-
-    def _by_features(self, features: Sequence[Array]) -> Array:
-        """Return what repeats by the features of each process, (M, D) [N]."""
-        shared, *own = features
-        found, at = np.zeros((len(shared), len(self.size))), self.told
-        for d in range(len(self.size)):
-            known = np.concatenate((shared, *own[d::len(self.size)]), axis=1)
-            found[:, d] = self.repeats[d] * (known @ self.coefficients[at:at + known.shape[1]])
-            at += known.shape[1]
+        found, count = np.zeros_like(q), q.shape[1]
+        for rows in (slice(start, start + CHUNK) for start in range(0, len(q), CHUNK)):
+            shared, *own = (one.known(q[rows], v[rows], period) for one in self.processes)
+            at = self.told
+            for d in range(count):
+                known = np.concatenate((shared, *own[d::count]), axis=1)
+                place = slice(at, at := at + known.shape[1])
+                found[rows, d] = self.repeats[d] * (known @ self.coefficients[place])
         return found
 
     def _open(self, residuals: Residuals, together: Sequence[Array], apart: Sequence[Array],

@@ -18,12 +18,12 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.efforts import (
-    effort_scales,
+    constants_reading,
     find_changed_efforts,
     find_no_measurements,
     find_scales,
     find_sign_bit,
-    gain_line,
+    unit_reading,
 )
 from pprs_dynamics.inference.readings.evidence import (
     Parts,
@@ -102,7 +102,7 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     if found := tuple(find_sign_bit(recording)):
         return found
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
-                if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
+                if (excerpt := excerpt_of(recording, table.STRETCHES, unit)) is not None}
     if wrong := [*_of_rate(model, recording, excerpts.get(1.0))]:
         return tuple(wrong)
     search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
@@ -370,7 +370,7 @@ def _time_units(recording: Recording) -> list[float]:
 
 def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
-    drives, units = model.drives, model.units
+    drives = model.drives
     if fit.time_unit != 1.0:
         yield OtherReading('time_unit', 1, f'the times look like {table.TIMES[fit.time_unit]}: as '
                            f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
@@ -383,27 +383,10 @@ def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[Other
         yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
                               scales=position_scales(model, fit.reading))
     if fit.has_constants:
-        every = tuple(range(len(drives)))
-        yield OtherReading.of(
-            'drive_constant', drives, every, f'the effort of {named(drives, every)} looks like '
-            'currents in amperes, or another unit: '
-            + ', '.join(f'{scale:.3g}' for scale in fit.scales) + ' times what the model says',
-            gain_line(fit.scales.tolist()))
+        yield constants_reading(model, dict(enumerate(fit.scales.tolist())))
         return
-    for scale in dict.fromkeys(fit.scales.tolist()):
-        group = tuple(np.flatnonzero(fit.scales == scale).tolist())
-        if scale == 1.0:
-            continue
-        unit = ' or '.join(dict.fromkeys(table.EFFORTS[abs(scale)].format(units[k].effort)
-                                         for k in group)) if abs(scale) != 1 else None
-        times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
-        guess = '' if unit is None else f', as if it were in {unit}'
-        is_either = scale < 0 and len(group) == len(drives)
-        other = f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
-        yield OtherReading.of('effort_sign' if unit is None else 'effort_unit', drives, group,
-                              f'the effort of {named(drives, group)} looks like {times} what '
-                              f'the model says{guess}{other if is_either else ""}',
-                              scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
+    for scale in dict.fromkeys(fit.scales[fit.scales != 1].tolist()):
+        yield unit_reading(model, np.flatnonzero(fit.scales == scale).tolist(), scale)
 
 
 def position_scales(model: DriveModel, reading: Reading) -> Scales:

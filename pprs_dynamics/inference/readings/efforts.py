@@ -41,28 +41,26 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
                if abs(scale) > table.CERTAIN * doubt}
     known = [contents[model.drives[k]] for k in certain]
     every = tuple(range(len(model.drives)))
-    scales, of_all = np.array([*certain.values()]), f'the effort of {named(model.drives, every)}'
+    scales = np.array([*certain.values()])
     if not certain or np.ptp(np.sign(scales)) > 0 or (scales[0] < 0 and any(
             one.friction > table.CERTAIN * one.friction_by_chance for one in known)):
         return []
     # Masses of a description are right within a factor; inertia alone may be invented.
     has_weight = any(abs(one.gravity) > table.CERTAIN * one.gravity_doubt for one in known)
     sizes, sign = np.abs(scales), float(np.sign(scales[0]))
-    gains_line = gain_line([certain.get(k, 1.0) for k in every])
-    for unit, name in table.EFFORTS.items():
+    for unit in table.EFFORTS:
         is_prefix = unit in table.PREFIXES
         tolerance = np.log(table.SAME_MASSES) if is_prefix and has_weight else table.NEAR_UNIT
         off = np.abs(np.log(sizes / unit))
         if np.all(off < tolerance) and (has_weight or is_prefix):
-            found = _unit(model, f'{of_all} looks like {sign * unit:.4g} times what the model '
-                          f'says, as if it were in {name.format(model.units[0].effort)}',
-                          np.full(len(every), sign / unit))
+            found = unit_reading(model, every, sign * unit)
             if is_prefix or np.all(off < table.AT_UNIT):
                 return [found]
             line = columns_line([found], model.recorded.columns is not None)
             return [OtherReading.of(
                 'ambiguous', model.drives, every, f'{found.what}, or in amperes: the factors are '
-                + ', '.join(f'{scale:.3g}' for scale in scales), f'{line} or {gains_line}')]
+                + ', '.join(f'{scale:.3g}' for scale in scales),
+                f'{line} or {constants_reading(model, certain).line}')]
     limits = model.limits.efforts[[*certain]]
     if len(certain) > 1 and has_weight and np.all(np.isfinite(limits)):
         gains = np.log(sizes * limits)
@@ -76,30 +74,42 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
                 is_share = bool(np.all(np.abs(sizes * limits * share - 1) < table.NEAR_ONE / 2)
                                 and np.any(np.abs(np.log(sizes)) > table.SEVERAL_FACTORS))
             if is_share:
-                return [_unit(model, f"{of_all} looks like {name} of the drives' largest",
-                              sign * share * model.limits.efforts)]
+                return [OtherReading.of(
+                    'effort_unit', model.drives, every, 'the effort of '
+                    f"{named(model.drives, every)} looks like {name} of the drives' largest",
+                    scales=effort_scales(model, every, sign * share * model.limits.efforts))]
     # A load may multiply what one drive of several needs.
     if has_weight and len(certain) >= min(2, len(every)) and np.all(
             np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
             sizes > table.LARGEST_COMPLIANCE):
-        listed = ', '.join(f'{scale:.3g} ({model.drives[k]})' for k, scale in certain.items())
-        return [OtherReading.of(
-            'drive_constant', model.drives, every, f'{of_all} is another multiple of what the '
-            f'masses need: {listed}: it looks like currents in amperes, or another unit',
-            gains_line)]
+        return [constants_reading(model, certain)]
     return []
 
 
-def gain_line(scales: Sequence[float]) -> str:
-    """Return the lines for efforts that are so many times what they should be: currents."""
-    return ('effort_kind: current, and beside urdf or mjcf  gain: ['
-            + ', '.join('1.0' if scale == 1 else f'{1 / scale:.3g}' for scale in scales) + ']')
-
-
-def _unit(model: DriveModel, what: str, factors: Array) -> OtherReading:
+def constants_reading(model: DriveModel, factors: Mapping[int, float]) -> OtherReading:
+    """Return the finding that efforts are multiples of the model's, by drive: currents."""
     every = tuple(range(len(model.drives)))
-    return OtherReading.of('effort_unit', model.drives, every, what,
-                           scales=effort_scales(model, every, factors))
+    listed = ', '.join(f'{factor:.3g} ({model.drives[k]})' for k, factor in factors.items())
+    gains = ', '.join('1.0' if factors.get(k, 1.0) == 1 else f'{1 / factors[k]:.3g}' for k in every)
+    return OtherReading.of(
+        'drive_constant', model.drives, every, f'the effort of {named(model.drives, every)} is '
+        f'another multiple of what the masses need: {listed}: it looks like currents in amperes, '
+        'or another unit', f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
+
+
+def unit_reading(model: DriveModel, group: Sequence[int], scale: float) -> OtherReading:
+    """Return the finding that efforts of some drives are the model's in another unit or sign."""
+    drives, kind = model.drives, 'effort_sign' if abs(scale) == 1 else 'effort_unit'
+    times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
+    what = f'the effort of {named(drives, tuple(group))} looks like {times} what the model says'
+    if abs(scale) != 1:
+        units = dict.fromkeys(table.EFFORTS[abs(scale)].format(model.units[k].effort)
+                              for k in group)
+        what += f', as if it were in {" or ".join(units)}'
+    if scale < 0 and len(group) == len(drives):
+        what += f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
+    return OtherReading.of(kind, drives, group, what, scales=effort_scales(
+        model, group, np.full(len(drives), 1 / scale)))
 
 
 def effort_scales(model: DriveModel, group: Sequence[int], factors: Array,

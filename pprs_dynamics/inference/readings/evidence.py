@@ -271,7 +271,7 @@ class Shares:
 def effort_contents(model: DriveModel, recording: Recording, excerpt: Excerpt | None = None,
                     ) -> dict[str, Shares]:
     """Return the shares of the efforts of drives that move and have enough samples."""
-    excerpt = excerpt or excerpt_of(recording, stretches=table.STRETCHES)
+    excerpt = excerpt or excerpt_of(recording, table.STRETCHES)
     parts = None if excerpt is None else parts_of(model, excerpt, plain(len(model.drives)))
     if excerpt is None or parts is None:
         return {}

@@ -17,7 +17,6 @@ from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_dr
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-STRETCHES = 3  # at the start, in the middle, at the end
 LONGEST = 2000  # samples of a stretch that are smoothed: 4 s at 500 Hz
 MOST_BLOCKS = 100  # of a stretch that are kept: a hundredth of a second each, evenly thinned
 PIECE = 10  # blocks that are followed together where a whole stretch cannot be
@@ -45,17 +44,16 @@ class Excerpt:
     velocity: Array | None
 
 
-def excerpt_of(recording: Recording, time_unit: float = 1.0, stretches: int = STRETCHES,
-               ) -> Excerpt | None:
+def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0) -> Excerpt | None:
     """Return an excerpt; None where no stretch is long enough.
 
     Parameters
     ----------
     recording : Recording
-    time_unit : float
-        What its times are counted in [s].
     stretches : int
         How many are taken at most, evenly over the recording.
+    time_unit : float
+        Unit of its times [s].
     """
     windows = [slice(first, min(first + LONGEST, part.stop)) for part in recording.segments
                for first in range(part.start, part.stop, LONGEST)

@@ -95,14 +95,7 @@ def _excerpt(recording: Recording, share: float) -> Recording:
     pieces = _pieces(recording, length)
     groups = np.array_split(np.arange(len(pieces)), max(1, round(share * len(pieces))))
     moved = _moved(recording, pieces)
-    chosen = [pieces[group[int(np.argmax(moved[group]))]] for group in groups]
-    segments = [chosen[0]]
-    for part in chosen[1:]:
-        if part.start == segments[-1].stop and part.start not in {
-                segment.start for segment in recording.segments}:
-            segments[-1] = slice(segments[-1].start, part.stop)
-        else:
-            segments.append(part)
+    segments = [pieces[group[int(np.argmax(moved[group]))]] for group in groups]
     kept = sum(part.stop - part.start for part in segments)
     finding = Defect(TOO_LONG, used - kept,
                      f'{used * step:.0f} s at {1 / step:.4g} Hz are more than a search holds in '

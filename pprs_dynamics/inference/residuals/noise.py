@@ -209,18 +209,6 @@ class NoiseSpectrum:
         """
         return float(np.clip(samples * self.rms ** 2 / self.amplitudes.sum(), 1, samples))
 
-    @property
-    def fast_rms(self) -> float:
-        """Root of the mean square of what lies at the higher frequencies [N].
-
-        All shapes reach there, also those of slow noise: it is 0 for no noise that is one.
-        """
-        highest = 0.5 / self.period
-        lowest = min(SLOW_SHARE * self.corners[-1], highest)
-        shares = np.concatenate(([1 - lowest / highest], self.corners / highest * (
-            np.arctan(highest / self.corners) - np.arctan(lowest / self.corners))))
-        return float(np.sqrt(self.amplitudes @ shares))
-
 
 def _shapes(corners: Array, frequency: Array) -> Array:
     slow = 1 / (1 + (frequency / corners[:, None]) ** 2)

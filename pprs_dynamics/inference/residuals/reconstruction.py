@@ -194,7 +194,6 @@ def reconstruct(
     ----------
     model : DriveModel
     recording : Recording
-        Or anything with its arrays and segments.
     progress : callable, optional
         Called with (samples done, all) now and then.
     window : float, optional
@@ -228,9 +227,10 @@ def reconstruct(
         notes.append('efforts of drives that stand do not count, static friction holds any: '
                      + (', '.join(shares) or 'less than 0.5% of the time'))
     drives = replace(drives, notes=tuple(notes))
+    gain = np.full(len(names), np.nan) if recording.gain is None else recording.gain
     return Reconstruction(
         **vars(drives), time=time, motion=motion, effort=effort,
-        treat=Treatment(drives.block_starts, total), gain=_applied_gain(recording), dropped=dropped,
+        treat=Treatment(drives.block_starts, total), gain=gain, dropped=dropped,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup)
 
@@ -318,12 +318,6 @@ def _windup(recording: Recording, read: DriveMotion) -> Array | None:
     link = _channels(recording, np.arange(len(recording.time), dtype=float))[LINK_POSITION]
     ahead = np.nan_to_num(recording.position - link)
     return np.stack(smoothed_as(read, replace(recording, position=ahead), lambda values: values))
-
-
-def _applied_gain(recording: Recording) -> Array:
-    """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
-    gain: Array | None = getattr(recording, 'gain', None)
-    return np.full(len(recording.drives), np.nan) if gain is None else gain
 
 
 def _channels(recording: Recording, index: Array) -> dict[str, Array]:

@@ -9,7 +9,7 @@ of sums that are known. It proposes; a fit with its own noise decides (`search.s
 
 from __future__ import annotations
 
-from collections.abc import Container, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
@@ -38,9 +38,8 @@ class Scan:
     def __init__(self, fits: FittedSets) -> None:
         self.fits = fits
 
-    def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
-                  least: float = PROPOSED,
-                  effects: Container[type[CatalogueEffect]] | None = None) -> list[Candidates]:
+    def proposals(self, base: CandidateSet, count: int | None = None, least: float = PROPOSED,
+                  drive: int | None = None) -> list[Candidates]:
         """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
 
         Parameters
@@ -48,17 +47,13 @@ class Scan:
         base : CandidateSet
         count : int, optional
             At most; by default all.
-        drive : int, optional
-            Only effects on this one.
         least : float
             By which the cost must fall at the set's noise.
-        effects : container of type, optional
-            Only these.
+        drive : int, optional
+            Only effects on this one.
         """
         scored: list[tuple[float, Candidates]] = []
         for effect, found in self.offers(base, drive).items():
-            if effects is not None and effect not in effects:
-                continue
             old = next((c for c in base.effects if c.effect is effect), None)
             # A body on another link is another explanation where all are asked for.
             for offered in [found] if count is not None else _by_place(effect, found):

@@ -210,8 +210,8 @@ class Search:
                  drive: int | None = None) -> list[Candidates]:
         """Return a part of a set with an effect that makes good most of what it lacks."""
         base = self.fits.at_noise_of(best, rest)
-        return self.scan.proposals(base, count, drive,
-                                   RECOVERED * (base.total - best.total) - REPLACED)
+        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
+                                   drive)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects replace one that is more than one hypothesis."""

@@ -20,6 +20,7 @@ import numpy as np
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.samples import Progress, Series
+from pprs_dynamics.measurement.files.way_out import MOST
 
 KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.npy': 'NumPy',
          '.json': 'JSON', '.jsonl': 'JSON', '.ndjson': 'JSON'}
@@ -29,7 +30,6 @@ DEEPEST = 6  # structures within structures of a MAT file
 LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joints for three hours
 WIDEST = 64  # elements of a list that may be joints
 ELEMENT = re.compile(r'(.+)\[(\d+)\]')
-MOST = 12  # names that are listed
 MATRIX = 'array'  # what a NumPy file of one array calls it
 
 

@@ -104,11 +104,7 @@ class Judgement:
     def _mark_impossible(self) -> None:
         """Replace damaged numbers by NaN: beyond all measurement, or few and far from the rest."""
         samples = self.samples
-        for quantity, unit, values in (('position', 'm', samples.position),
-                                       ('velocity', 'm/s', samples.velocity),
-                                       ('effort', 'N', samples.effort)):
-            if values is None:
-                continue
+        for quantity, unit, values in _quantities(samples):
             bad = np.isfinite(values) & (np.abs(values) > LARGEST_MEASURED)
             rest = np.where(bad, np.nan, values)
             bad |= np.column_stack([signals.far_from_the_rest(column, SHORTEST_SEGMENT)
@@ -280,25 +276,18 @@ class Judgement:
                    f'{counted(count, "sample")} repeating every value of the one before', runs)
         for drive, name in enumerate(samples.drives):
             moves = not signals.is_constant(samples.position[:, drive])
-            if not moves:
-                self._tell('constant_position', 1,
-                           f'the position of {name} is {samples.position[0, drive]:.6g} '
-                           f'{samples.unit_of(drive, "m")} throughout', drives=[name])
-            velocity = None if samples.velocity is None else samples.velocity[:, drive]
-            if moves and velocity is not None and signals.is_constant(velocity):
-                self._tell('constant_velocity', 1,
-                           f'the velocity of {name} is {velocity[np.isfinite(velocity)][0]:.6g} '
-                           f'{samples.unit_of(drive, "m/s")} throughout, while it moves',
-                           drives=[name])
-            effort = samples.effort[:, drive]
-            if signals.is_constant(effort):
-                self._tell('constant_effort', 1,
-                           f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} '
-                           f'{samples.unit_of(drive, "N")} throughout', drives=[name])
-                continue
-            runs = signals.stuck_efforts(samples, drive)
-            self._tell('constant_effort', len(runs),
-                       f'the effort of {name} does not change while it moves', runs, [name])
+            for quantity, unit, values in _quantities(samples):
+                known = values[np.isfinite(values[:, drive]), drive]
+                if signals.is_constant(known) and (moves or quantity != 'velocity'):
+                    self._tell(f'constant_{quantity}', 1,
+                               f'the {quantity} of {name} is {known[0]:.6g} '
+                               f'{samples.unit_of(drive, unit)} throughout'
+                               + (', while it moves' if quantity == 'velocity' else ''),
+                               drives=[name])
+            if not signals.is_constant(samples.effort[:, drive]):
+                runs = signals.stuck_efforts(samples, drive)
+                self._tell('constant_effort', len(runs),
+                           f'the effort of {name} does not change while it moves', runs, [name])
 
     def _cut_segments(self) -> None:
         time = self.samples.time
@@ -319,6 +308,13 @@ class Judgement:
 
     def _named(self, mask: Mask) -> list[str]:
         return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
+
+
+def _quantities(samples: Samples) -> list[tuple[str, str, NDArray[np.float64]]]:
+    """Return what is measured, with its unit where drives push, and its values, (N, D)."""
+    return [(quantity, unit, values) for quantity, unit, values in (
+        ('position', 'm', samples.position), ('velocity', 'm/s', samples.velocity),
+        ('effort', 'N', samples.effort)) if values is not None]
 
 
 def _taken(samples: Samples, index: Indices | Mask) -> Samples:

@@ -50,7 +50,7 @@ def arguments_of(options: Mapping[str, Any]) -> Sequence[str]:
 def folder_of(file: str, arguments: Sequence[str]) -> Path:
     """Return the folder that a relative path in a parameter counts from.
 
-    That of the last parameter file beside which it exists, else the present one.
+    That of the last parameter file in whose folder it exists, else the present one.
     """
     folders = [path.resolve().parent for path in reversed(_paths(arguments))]
     return next((folder for folder in folders if (folder / file).exists()), Path.cwd())

@@ -247,12 +247,9 @@ class Api:
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
-        found = robot_motion(self.hub.the_session)
-        drawn = found.skeleton
+        drawn, arrays = robot_motion(self.hub.the_session)
         return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
-                       'joints': list(drawn.joints.values()), 'labels': drawn.labels}, {
-            'time': found.time, 'points': drawn.points, 'before': found.before,
-            'now': found.now})
+                       'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
