@@ -188,8 +188,8 @@ class MonitorNode(ManagedNode):
         if tree.bodies and self._tf is not None:
             self._tf.publish(TFMessage(
                 transforms=conversions.transforms(
-                stamp, tree.base, tree.bodies, pose.bodies,
-                self._settings.node_values['tf_prefix'])))
+                    stamp, tree.base, tree.bodies, pose.bodies,
+                    self._settings.node_values['tf_prefix'])))
 
     def _compare(self) -> None:
         if self.state != 'active':
@@ -264,12 +264,12 @@ class MonitorNode(ManagedNode):
         """Return what a person may adopt now, or raise PprsError."""
         if self._diagnosed.values != self._settings.model.values:
             raise NotSetError('the latest window was diagnosed against another model than is '
-                                  'in force')
+                              'in force')
         if not self._changed:
             raise NotSetError('no effect is confirmed')
         if not self._adoptable:
             raise NotSetError('the latest window names other effects than are confirmed, and '
-                                  'its numbers were fitted together; the next one decides')
+                              'its numbers were fitted together; the next one decides')
         return self._adoptable
 
     async def _adopt(self, request: Any, response: Any) -> Any:

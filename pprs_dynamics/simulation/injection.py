@@ -734,9 +734,9 @@ def _force(name: str, run: Injection) -> Injected:
 
 
 def _coupled_drives(run: Injection) -> Injected:
-    """Inject friction of a motor that moves several joints, v the speed of the motor:
+    """Inject friction of a motor that moves several joints.
 
-    A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)).
+    With v the speed of the motor: A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)).
     """
     motors = run.model.robot.motors
     if not motors:
@@ -886,7 +886,7 @@ def one_able_joint(name: str, model: DriveModel, motion: JointMotion,
     able = able_joints(name, model, motion)
     if not able:
         raise InjectedEffectError(f'{name} needs a joint that turns by '
-                                f'{FORMS[name].needs_turn:g} rad')
+                                  f'{FORMS[name].needs_turn:g} rad')
     return able[int(random.integers(len(able)))]
 
 

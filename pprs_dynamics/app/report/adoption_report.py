@@ -38,8 +38,7 @@ MOST_REMARKS = 2
 
 
 def run_view(run: AdoptionRun, details: bool = False) -> Any:
-    """Return the adopted and refused effects, a line or all values of each, and the reason to end.
-    """
+    """Return adopted and refused effects, a line or all values of each, and the reason to end."""
     steps = [adoption_view(step) if details else escape(headline(step)) for step in run.steps]
     return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
 

@@ -181,9 +181,9 @@ def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
 def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [
         (effect.name, sites(effect.drives, diagnosis, effect.places),
-             _fall(effect.error_before, effect.error_after),
-             _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
-            for effect in diagnosis.effects]
+         _fall(effect.error_before, effect.error_after),
+         _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+        for effect in diagnosis.effects]
     given = root_mean_square(diagnosis.residuals.error)
     if abs(diagnosis.refit - given) > LEAST_REFIT * given:
         rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))

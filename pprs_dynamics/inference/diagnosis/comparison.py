@@ -153,10 +153,10 @@ class Comparison:
     def where(self) -> tuple[Statement, ...]:
         """Statements that explain a visible share of the squared error, the largest first."""
         large = [statement for statement in self.localisation.statements
-                if statement.drive in self.drives
-                and not self.drives[statement.drive].relative < DECISIONS.negligible
-                and statement.share_of_error >= DECISIONS.statement_share
-                and statement.mean_square >= (
+                 if statement.drive in self.drives
+                 and not self.drives[statement.drive].relative < DECISIONS.negligible
+                 and statement.share_of_error >= DECISIONS.statement_share
+                 and statement.mean_square >= (
                     DECISIONS.statement_share * self.drives[statement.drive].rms ** 2)]
         return tuple(sorted(large, key=lambda statement: -statement.mean_square))
 

@@ -105,8 +105,7 @@ class Motions:
         return self.limits.uses(self.model, self.forces(series, time))
 
     def draw(self, random: Random) -> JointSeries:
-        """Return a random motion in which each coordinate has a random share of its largest size.
-        """
+        """Return a random motion: each coordinate has a random share of its largest size."""
         highest = [k for k in self.harmonics if k <= HIGHEST_FREQUENCY * self.duration]
         harmonics, count = int(random.choice(highest or self.harmonics[:1])), len(self.middle)
         series = JointSeries(random.normal(size=(count, JointSeries.size(harmonics))),

@@ -137,12 +137,12 @@ MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
     'link'))
 UNIT_WORDS = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math.pi / 180,
-                     'degrees': math.pi / 180, 'grad': math.pi / 180, 'rev': 2 * math.pi,
-                     'mm': 1e-3, 'mrad': 1e-3},
-          VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
-                     'mm': 1e-3, 'mms': 1e-3},
-          EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
-          CURRENT: {'ma': 1e-3}}
+                         'degrees': math.pi / 180, 'grad': math.pi / 180, 'rev': 2 * math.pi,
+                         'mm': 1e-3, 'mrad': 1e-3},
+              VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
+                         'mm': 1e-3, 'mms': 1e-3},
+              EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
+              CURRENT: {'ma': 1e-3}}
 TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'us': 1e-6,
               'usec': 1e-6, 'micros': 1e-6, 'ns': 1e-9, 'nsec': 1e-9, 'nanoseconds': 1e-9}
 

@@ -339,7 +339,6 @@ class CandidateSet:
         """Columns for the uncertainty of forms, of all components."""
         return tuple(block for blocks in self.nuisance.values() for block in blocks.values())
 
-
     @cached_property
     def total(self) -> float:
         """What its terms add up to, whether it may be or not."""

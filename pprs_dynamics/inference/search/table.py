@@ -358,5 +358,3 @@ def _shortlist(fits: FittedSets) -> Iterable[CandidateSet]:
                 is_far and fitted.is_nonlinear and fitted.is_admissible):
             near.setdefault(fitted.row_key, fitted)
     return list(near.values())[:MOST_EXACT]
-
-

@@ -232,4 +232,4 @@ def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chos
                                    for name, values in added.items()}), count + chosen, count + 6)
     rows = np.array([*range(len(t.passive)), *range(len(t.rows), len(tied.rows))])
     return with_elimination_order(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
-                       np.append(every, units), np.append(structure.home, np.zeros(6)))
+                                  np.append(every, units), np.append(structure.home, np.zeros(6)))
