@@ -48,6 +48,8 @@ COMPARED = 0.05  # [s] between looks at what came in
 MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
 PATIENCE = 5.0  # [s] for a running node's answer
 SHOWN = 20.0  # [s] of residuals that are kept to be drawn
+COMMANDS = {'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/JointState',
+            'trajectory_msgs/msg/JointTrajectory'}  # what drives take
 
 
 class UnconfirmedError(PprsError):
@@ -92,16 +94,20 @@ class LiveJointStates(Node):
         steady_timer(self, COMPARED, self._compare)
 
     def machine(self) -> str:
-        """Return the node that drives and its robot; '' where none runs."""
+        """Return the node that drives, its robot and who takes its commands; '' where none runs."""
         if not self.owner.is_there:
             return ''
         name, status = self.owner.name, self.owner.status
         full_name = name if name.startswith('/') else (
             f'{self.get_namespace().rstrip("/")}/{name}')
-        files = ', '.join(Path(each['file']).name
-                          for each in status.get('model', {}).get('files', ()))
-        robot = f'; robot {status["robot"]}' if status.get('robot') else ''
-        return f'node {full_name}{robot}' + (f' of {files}' if files else '')
+        said = [f'node {full_name}']
+        if robot := status.get('robot'):
+            files = ', '.join(Path(each['file']).name
+                              for each in status.get('model', {}).get('files', ()))
+            said.append(f'robot {robot}' + (f' of {files}' if files else ''))
+        if takers := self._takers(full_name):
+            said.append(f'commands go to {", ".join(takers)}')
+        return '; '.join(said)
 
     def with_prefix(self, model: DriveModel) -> DriveModel:
         """Return a model with the parameter `joint_prefix` of this node, if it is given."""
@@ -114,6 +120,19 @@ class LiveJointStates(Node):
             self.stream.use_model(DriveModel.from_parameters({
                 **self.model.values,
                 **{each.name: plain_value(each.value) for each in parameters}}, self.model.source))
+
+    def _takers(self, full_name: str) -> list[str]:
+        """Return the nodes that subscribe to a node's commands."""
+        namespace, _, name = full_name.rpartition('/')
+        try:
+            topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')
+        except RuntimeError:  # the public base of rclpy's own: it is not known any more
+            return []
+        return sorted({
+            f'{taker.node_namespace.rstrip("/")}/{taker.node_name}'
+            for topic, kinds in topics if COMMANDS & set(kinds) and not topic.endswith('/error')
+            for taker in self.get_subscriptions_info_by_topic(topic)} - {
+                self.get_fully_qualified_name()})
 
     @property
     def model(self) -> DriveModel:
