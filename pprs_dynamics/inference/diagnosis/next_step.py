@@ -16,6 +16,7 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.reference_keys import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
@@ -36,7 +37,7 @@ class GivenFiles:
     ----------
     recordings, validate : tuple of str
     model : str
-        '' for the default.
+        Its file; `config/paper.yaml` for the paper's robot.
     topic : str
         '' where none was chosen.
     reference : tuple of str, optional
@@ -45,7 +46,7 @@ class GivenFiles:
 
     recordings: tuple[str, ...] = ('RECORDING',)
     validate: tuple[str, ...] = ()
-    model: str = ''
+    model: str = 'MODEL.yaml'
     topic: str = ''
     reference: tuple[str, ...] | None = None
 
@@ -66,8 +67,8 @@ class GivenFiles:
             given += [part for name in self.validate for part in ('--validate', name)]
         if self.reference is not None and words[0] in ('adopt', 'diagnose'):
             given += ['--reference', *self.reference]
-        for option, value in (('--model', self.model), ('--topic', self.topic)):
-            given += [option, value] if value else []
+        given += ['--demo'] if self.model == DEFAULT_MODEL else ['--model', self.model]
+        given += ['--topic', self.topic] if self.topic else []
         return shlex.join([*given, *words[first:]])
 
     def output(self, name: str) -> str:
@@ -77,7 +78,7 @@ class GivenFiles:
         """
         given, new = Path(self.model), Path(name)
         stem, _, number = given.stem.rpartition('_')
-        if not self.model or given.absolute().parent != new.absolute().parent:
+        if given.absolute().parent != new.absolute().parent:
             return name
         if given.stem == new.stem:
             return f'{new.stem}_2{new.suffix}'
@@ -86,7 +87,7 @@ class GivenFiles:
         return name
 
 
-PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
+PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made from memory
 
 
 def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
