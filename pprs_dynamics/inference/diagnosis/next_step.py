@@ -21,6 +21,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+    from pprs_dynamics.inference.diagnosis.statements import Statement
     from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -90,14 +91,25 @@ class GivenFiles:
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made from memory
 
 
-def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
+def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = None,
+               ) -> tuple[str, str]:
     """Return what to do first where a model explains little, and the command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
+
+    Parameters
+    ----------
+    model : DriveModel
+    files : GivenFiles
+    worst : Statement, optional
+        What explains most of the squared error.
     """
     is_fitted = bool(reference_files(model.values, model.source))
     check = 'Check units, signs and zeros, and that the file describes this machine'
     if not model.is_mechanism or is_fitted:
+        if worst is not None and worst.kind == 'friction':
+            return ('Find out which effect explains this error by friction',
+                    files.command('diagnose', '--report', 'why.html'))
         return check, files.command('info')
     words = ('The model has no friction yet. Fit inertia and friction first'
              if _has_no_friction(model) else f'{check}. Then fit the model')
