@@ -39,7 +39,7 @@ class Scan:
         self.fits = fits
 
     def proposals(self, base: CandidateSet, count: int | None = None, least: float = PROPOSED,
-                  drive: int | None = None) -> list[Candidates]:
+                  ) -> list[Candidates]:
         """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
 
         Parameters
@@ -49,11 +49,9 @@ class Scan:
             At most; by default all.
         least : float
             By which the cost must fall at the set's noise.
-        drive : int, optional
-            Only effects on this one.
         """
         scored: list[tuple[float, Candidates]] = []
-        for effect, found in self.offers(base, drive).items():
+        for effect, found in self.offers(base).items():
             old = next((c for c in base.effects if c.effect is effect), None)
             # A body on another link is another explanation where all are asked for.
             for offered in [found] if count is not None else _by_place(effect, found):
@@ -65,21 +63,19 @@ class Scan:
         scored.sort(key=lambda scored: -scored[0])
         return [candidates for _, candidates in scored[:count]]
 
-    def offers(self, base: CandidateSet, drive: int | None = None,
-               ) -> dict[type[CatalogueEffect], list[Scored]]:
+    def offers(self, base: CandidateSet) -> dict[type[CatalogueEffect], list[Scored]]:
         """Return gains less prior costs of components, by effect; one for each drive or place."""
         components, fit = self.fits.components, base.fit
         taken = {(component.effect, component.drive) for component in base.blocks}
-        drives = tuple(components.local) if drive is None else (drive,)
 
         def of_drive(d: int) -> list[tuple[Component, float]]:
             found = list(components.local[d].offers(fit).values())
             self.fits.stepped()
             return found
 
-        offered = each(of_drive, drives)
+        offered = each(of_drive, tuple(components.local))
         offers = [offer for found_there in offered for offer in found_there]
-        offers += components.shared_offers(fit) if drive is None else []
+        offers += components.shared_offers(fit)
         best: dict[Hashable, Scored] = {}
         for component, gain in offers:
             place = (component.effect, component.drive)

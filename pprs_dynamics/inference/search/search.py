@@ -176,7 +176,7 @@ class Search:
         return found
 
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
-        """Yield sets in which something else replaces candidates, or one on a drive.
+        """Yield sets in which something else replaces candidates.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
@@ -187,41 +187,14 @@ class Search:
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         for candidate in best.effects:
-            yield from self._instead_on_a_drive(best, candidate)
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
-            if len(candidate.hypotheses) > 1:
-                yield from self._two_for(best, candidate)
-
-    def _instead_on_a_drive(self, best: CandidateSet, candidate: EffectCandidate,
-                            ) -> Iterator[Candidates]:
-        """Yield sets in which another effect replaces one on one of its drives.
-
-        There it, or some of its coefficients, may imitate the other one.
-        """
-        for component in candidate.components if len(candidate.components) > 1 else ():
-            fewer = [(other,) for other in self.fits.components.variants(component)
-                     if set(other.names) < set(component.names)]
-            for kept in ((), *fewer):
-                rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
-                yield from self._instead(best, rest, REPLACEMENTS, component.drive)
 
     def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
-                 drive: int | None = None) -> list[Candidates]:
+                 ) -> list[Candidates]:
         """Return a part of a set with an effect that makes good most of what it lacks."""
         base = self.fits.at_noise_of(best, rest)
-        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
-                                   drive)
-
-    def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
-        """Yield sets in which two other effects replace one that is more than one hypothesis."""
-        def with_another(candidates: Candidates) -> list[Candidates]:
-            found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
-            return [more for more in found if all(
-                candidate.effect is not gone.effect for candidate in more
-                if isinstance(candidate, EffectCandidate))]
-        for first in with_another(best.without(gone)):
-            yield from with_another(first)[:REPLACEMENTS]
+        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED)
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate in the shapes that its own is easily taken for."""
