@@ -323,14 +323,15 @@ class Sensitivities:
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
         values = effect.to_coefficients(present.values) if present is not None else {}
+        before = (None if issubclass(effect, BodyEffect)
+                  else (effect.at(values) if present is None else present).force(state))
 
         def columns(coefficient: Parameter) -> tuple[Array, Array]:
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
-            if not isinstance(moved, BodyEffect):
-                before = effect.at(values) if present is None else present
-                change = self.sensed((moved.force(state) - before.force(state)) / step, state)
+            if before is not None:
+                change = self.sensed((moved.force(state) - before) / step, state)
                 return change, change
             found = moved.apply(state) if present is None else self._at(replace(
                 self.model, effects=tuple(moved if effect is present else effect
