@@ -166,11 +166,6 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not effects:
-        if not is_change and diagnosis.model.is_mechanism and any(
-                effect.objection and not effect.is_only_refuted
-                for effect in diagnosis.unconfirmed):
-            # An impossible effect means that the model is of another machine.
-            return first_step(diagnosis.model, files)
         return (f'Do not add {listed([effect.name for effect in diagnosis.unconfirmed])}. Record '
                 'another motion, and diagnose both recordings', both)
     if len(effects) == 1:
