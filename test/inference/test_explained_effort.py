@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import model_recordings
 import numpy as np
 import pytest
 from made_up_arm import motion, real_arm, record, write_arm
@@ -70,6 +71,19 @@ def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -
     assert not fitted.fit.little
     assert min(fitted.to_dict()['explained'].values()) > 0.9
     assert compare(fitted.model, made).comparison.little == {}
+
+
+def test_an_error_with_the_sign_of_the_motion_sends_nobody_to_check_units() -> None:
+    real = DriveModel.load()
+    bare = DriveModel.from_parameters({
+        **real.values, 'friction.drives.coulomb': (0.0,) * 6,
+        'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0})
+    compared = compare(bare, model_recordings.record(real, noise=0.01))
+    assert compared.comparison.little
+    said = ' '.join(str(compared).split())
+    assert 'too little friction' in said
+    assert 'Check units' not in said
+    assert 'pprs diagnose' in said
 
 
 @pytest.mark.parametrize('size', [0.0, 0.05])

@@ -15,11 +15,12 @@ from single_axis import axis_motion
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
-from pprs_dynamics.inference.search.constraints import limits_reached
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
@@ -62,9 +63,11 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
     if share < 1:
         np.testing.assert_allclose(taken, share * own, rtol=0.05)
         assert found.terms.feasibility == 0
+        assert fits.refused(found) == []
     else:
         np.testing.assert_allclose(taken, own, rtol=1e-9)
         assert found.terms.feasibility > DECISIONS.rival_margin
+        assert fits.refused(found) == [component]
 
 
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
@@ -81,6 +84,7 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     assert held.coefficients(both)[1] == pytest.approx(0, abs=1e-9)
     assert held.coefficients(both)[0] == pytest.approx(COULOMB, rel=0.05)
     assert without.cost < held.cost
+    assert fits.refused(held) == []
 
 
 def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
@@ -110,17 +114,19 @@ def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
 def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     """Mass and friction that all are too small explain as well what a gain of 1.9 would."""
     loose = DriveModel.from_parameters({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
-    found = diagnose(loose, [recorded(1.9 * MODEL.drive_forces(axis_motion(TIME)).total)])
+    doubled = recorded(1.9 * MODEL.drive_forces(axis_motion(TIME)).total)
+    found = diagnose(loose, [doubled])
     assert found.effects
     assert not [one for one in found.effects if one.name == 'effort_gain']
-    fits = FittedSets(Design.of(loose, [recorded(
-        1.9 * MODEL.drive_forces(axis_motion(TIME)).total)]), DECISIONS)
+    fits = FittedSets(Design.of(loose, [doubled]), DECISIONS)
     component = Component.of(catalogue()['effort_gain'], 0, {}, ('gain',))
     alone = fits.evaluate((EffectCandidate.of([component]),))
     assert alone.coefficients(component) == pytest.approx([0.5])
     assert alone.terms.feasibility > DECISIONS.rival_margin
-    (clause,) = limits_reached(fits.design, alone, component)
-    assert clause.startswith('the gain of axis would be beyond 0.5')
+    assert fits.refused(alone) == [component]
+    answer = adopt(loose, EffectRequest.of('effort_gain'), [doubled])
+    assert not answer.adopted
+    assert 'the values of effort_gain that fit best are impossible on axis' in answer.reason
 
 
 @pytest.mark.slow

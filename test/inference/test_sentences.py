@@ -20,8 +20,10 @@ from made_up_diagnosis import (
     made_up_residuals,
     statement,
 )
+from made_up_recordings import judged, measured
 from rich.console import Console
 
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.drives import DRIVES
@@ -29,6 +31,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 def one_effect(**changes: Any) -> Diagnosis:
@@ -114,6 +117,27 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     assert "--model 'my robot.yaml' --topic /arm/joint_states" in command
     words = shlex.split(command)[1:]
     assert _parser(words).parse_args(words).topic == '/arm/joint_states'
+
+
+def test_commands_say_whose_robot_the_model_is() -> None:
+    assert GivenFiles(('a.csv',), model='config/paper.yaml').command('info') == (
+        'pprs info a.csv --demo')
+    model = DriveModel.load()
+    recording = judged(measured())
+    changed = DriveModel.from_parameters({**model.values, 'masses.payload': 1.1})
+    for given, words in (('config/paper.yaml', '--demo'), (model, '--demo'),
+                         (changed, '--model MODEL.yaml')):
+        assert Inputs.of(given, recording).files.command('diagnose') == (
+            f'pprs diagnose RECORDING {words}')
+
+
+def test_a_rival_of_one_of_two_effects_reads_as_in_its_place() -> None:
+    two = made_up_diagnosis(
+        'ambiguous', effects=(found_effect('coulomb_friction'), found_effect('time_delay')),
+        indistinguishable=(('coulomb_friction', 'friction_drift'),))
+    headline = word_diagnosis(two).headline
+    assert re.search(r'coulomb_friction on \w+ \([^)]*, or friction_drift in its place: the data '
+                     r'do not separate these\) and time_delay', headline), headline
 
 
 def test_the_page_escapes_what_comes_from_files() -> None:

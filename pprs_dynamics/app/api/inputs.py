@@ -58,8 +58,8 @@ class Inputs:
         Which of those names are paths.
     base : Path or None
         The model's file; None for a model from memory.
-    model_path : str
-        As given; '' for the default or from memory.
+    model_path : str, optional
+        Name of the model's file as given, `config/paper.yaml` for the paper's; None from memory.
     topic : str
         As given; '' for none.
     as_it_is : bool
@@ -75,7 +75,7 @@ class Inputs:
     validation: Mapping[str, Recording]
     paths: frozenset[str] = frozenset()
     base: Path | None = None
-    model_path: str = ''
+    model_path: str | None = None
     topic: str = ''
     as_it_is: bool = False
     reference: Reference | None = None
@@ -116,14 +116,15 @@ class Inputs:
         found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
-        given = base or '' if isinstance(model, DriveModel) else model
+        given = base if isinstance(model, DriveModel) else model
+        path = DEFAULT_MODEL if shipped else None if given is None else str(given)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
         _refuse_repeats(held_out, fitted.values(), OTHER)
         entries = [*listed_recordings(recordings), *listed_recordings(validate)]
         paths = frozenset(str(entry) for entry in entries if not isinstance(entry, Recording))
-        return cls(found, fitted, held_out, paths, base, '' if shipped else str(given), topic or '')
+        return cls(found, fitted, held_out, paths, base, path, topic or '')
 
     def _each(self, change: Callable[[Mapping[str, Recording]], dict[str, Recording]]) -> Inputs:
         return replace(self, recordings=change(self.recordings), validation=change(self.validation))
@@ -241,10 +242,11 @@ class Inputs:
         # Here and below: reading alone, as `pprs info` does, needs no statistics.
         from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
 
+        model = self.model_path or PLACEHOLDERS.model
         if not {*self.recordings, *self.validation} <= self.paths:
-            return replace(PLACEHOLDERS, model=self.model_path)
-        return GivenFiles(tuple(self.recordings), tuple(self.validation), self.model_path,
-                          self.topic, self.reference_paths)
+            return replace(PLACEHOLDERS, model=model)
+        return GivenFiles(tuple(self.recordings), tuple(self.validation), model, self.topic,
+                          self.reference_paths)
 
     @property
     def ledger(self) -> LedgerBook:

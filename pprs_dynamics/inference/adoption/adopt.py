@@ -236,12 +236,17 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     answer = Answer(table, row, case.validate, diagnosis.decisions)
     effect = next(effect for effect in answer.effects if effect.name == request.name)
     after, gone = requested_model(answer, request, effect)
-    impossible = effect.objection and not effect.is_only_refuted
+    refused = [component.drive for component in row.fits.refused(row.fitted)
+               if component.effect is effect.effect]
+    places = listed([answer.drives[d] for d in refused if d is not None])
+    impossible = (f'the values of {request.name} that fit best are impossible'
+                  f'{places and f" on {places}"}: beyond its bounds, or more is taken away than '
+                  'the model has',) if refused else ()
     pushing = () if gone or not request.effect.is_friction else _of_friction(
         effect, after, measure_residuals(after, case.recordings)[0])
     found = case.adoption(request, after, (effect.held_out_before, effect.held_out_after),
                           effect.gain, (*_of_table(case, request, row, effect),
-                                        *((effect.objection,) if impossible else ()), *pushing))
+                                        *impossible, *pushing))
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(margin)
         if request.name in (*rival.missing, *rival.instead)

@@ -34,7 +34,6 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.constraints import limits_reached
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
@@ -186,18 +185,21 @@ class Answer:
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
-            gain, self._objection(candidate, less / max(with_force, 1e-300), gain),
+            gain, self._objection(less / max(with_force, 1e-300), gain),
             self._ranked_set(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
-    def _objection(self, candidate: EffectCandidate, ratio: float,
-                   gain: PredictiveGain | None) -> str:
-        """Return why an effect of the row is no finding, as a clause; '' where it is one."""
-        if self.fitted.terms.feasibility > self.decisions.rival_margin:
-            for component in candidate.components:
-                for clause in limits_reached(self.design, self.fitted, component):
-                    return clause
+    def _objection(self, ratio: float, gain: PredictiveGain | None) -> str:
+        """Return why data refute an effect of the row, as a clause; '' where they do not.
+
+        Parameters
+        ----------
+        ratio : float
+            Of the error without its force and with it.
+        gain : PredictiveGain or None
+            Of held-out data; None where it is not known.
+        """
         if ratio < 1 - self.decisions.error_rise:
             return f'without its force the error is {1 - ratio:.0%} smaller'
         if gain is None or not np.isfinite(gain.certainty):
@@ -362,23 +364,14 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decis
         rest = tuple(c for c in table.best.fitted.candidates if c.name not in names)
         fits = table.best.fits
         answer = Answer(table, Row(fits, fits.evaluate(rest), 0.0), validate, decisions)
-    return answer.diagnosis(tuple(unconfirmed))
+    return answer.diagnosis(unconfirmed)
 
 
 @outside_cost('an effect that raises the error, on the recordings or held out, is not confirmed: '
               '`unknown`')
-def unconfirmed_effects(answer: Answer) -> list[FoundEffect]:
-    """Return the effects of a row that data do not confirm, with the reason.
-
-    Where one of them is impossible, none is confirmed.
-    """
-    objected = [effect for effect in answer.effects if effect.objection]
-    impossible = [effect.name for effect in objected if not effect.is_only_refuted]
-    if not impossible:
-        return objected
-    return [*objected, *(
-        replace(effect, objection=f'it was fitted with {listed(impossible)}, which is impossible')
-        for effect in answer.effects if not effect.objection)]
+def unconfirmed_effects(answer: Answer) -> tuple[FoundEffect, ...]:
+    """Return the effects of a row that data do not confirm."""
+    return tuple(effect for effect in answer.effects if effect.objection)
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),

@@ -76,7 +76,7 @@ class FoundEffect:
         By how much the reported effects predict held-out data better than without it; None where
         that is unknown.
     objection : str
-        Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
+        Why data refute it, as a clause; '' where they do not.
     without : RankedSet, optional
         The best set without it, against the best one with it.
     in_model : mapping of str to float
@@ -120,11 +120,6 @@ class FoundEffect:
     def certainty(self) -> float:
         """Standard errors of the held-out gain; NaN where that is unknown."""
         return float('nan') if self.gain is None else self.gain.certainty
-
-    @property
-    def is_only_refuted(self) -> bool:
-        """Whether a machine may have it, and only the error objects, held out or fitted."""
-        return self.objection.startswith(('held-out', 'without its force'))
 
     @property
     def when(self) -> str:

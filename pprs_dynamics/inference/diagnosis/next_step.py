@@ -16,10 +16,12 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.reference_keys import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+    from pprs_dynamics.inference.diagnosis.statements import Statement
     from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -36,7 +38,7 @@ class GivenFiles:
     ----------
     recordings, validate : tuple of str
     model : str
-        '' for the default.
+        Its file; `config/paper.yaml` for the paper's robot.
     topic : str
         '' where none was chosen.
     reference : tuple of str, optional
@@ -45,7 +47,7 @@ class GivenFiles:
 
     recordings: tuple[str, ...] = ('RECORDING',)
     validate: tuple[str, ...] = ()
-    model: str = ''
+    model: str = 'MODEL.yaml'
     topic: str = ''
     reference: tuple[str, ...] | None = None
 
@@ -66,8 +68,8 @@ class GivenFiles:
             given += [part for name in self.validate for part in ('--validate', name)]
         if self.reference is not None and words[0] in ('adopt', 'diagnose'):
             given += ['--reference', *self.reference]
-        for option, value in (('--model', self.model), ('--topic', self.topic)):
-            given += [option, value] if value else []
+        given += ['--demo'] if self.model == DEFAULT_MODEL else ['--model', self.model]
+        given += ['--topic', self.topic] if self.topic else []
         return shlex.join([*given, *words[first:]])
 
     def output(self, name: str) -> str:
@@ -77,7 +79,7 @@ class GivenFiles:
         """
         given, new = Path(self.model), Path(name)
         stem, _, number = given.stem.rpartition('_')
-        if not self.model or given.absolute().parent != new.absolute().parent:
+        if given.absolute().parent != new.absolute().parent:
             return name
         if given.stem == new.stem:
             return f'{new.stem}_2{new.suffix}'
@@ -86,17 +88,28 @@ class GivenFiles:
         return name
 
 
-PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
+PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made from memory
 
 
-def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
+def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = None,
+               ) -> tuple[str, str]:
     """Return what to do first where a model explains little, and the command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
+
+    Parameters
+    ----------
+    model : DriveModel
+    files : GivenFiles
+    worst : Statement, optional
+        What explains most of the squared error.
     """
     is_fitted = bool(reference_files(model.values, model.source))
     check = 'Check units, signs and zeros, and that the file describes this machine'
     if not model.is_mechanism or is_fitted:
+        if worst is not None and worst.kind == 'friction':
+            return ('Find out which effect explains this error by friction',
+                    files.command('diagnose', '--report', 'why.html'))
         return check, files.command('info')
     words = ('The model has no friction yet. Fit inertia and friction first'
              if _has_no_friction(model) else f'{check}. Then fit the model')
@@ -153,11 +166,6 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not effects:
-        if not is_change and diagnosis.model.is_mechanism and any(
-                effect.objection and not effect.is_only_refuted
-                for effect in diagnosis.unconfirmed):
-            # An impossible effect means that the model is of another machine.
-            return first_step(diagnosis.model, files)
         return (f'Do not add {listed([effect.name for effect in diagnosis.unconfirmed])}. Record '
                 'another motion, and diagnose both recordings', both)
     if len(effects) == 1:

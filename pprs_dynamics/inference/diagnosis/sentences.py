@@ -284,7 +284,8 @@ def _headline(diagnosis: Diagnosis) -> str:
         return f'No effect is reported. {unseen}' if unseen and not diagnosis.since else (
             f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
             f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
-    which = ' (the data do not separate these)' if diagnosis.indistinguishable else ''
+    which = (' (the data do not separate these)'
+             if diagnosis.indistinguishable and len(effects) == 1 else '')
     level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
@@ -293,10 +294,17 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 def _lacking(diagnosis: Diagnosis) -> str:
     """Return which effects the model lacks, and which of its values the data contradict."""
-    several = len(diagnosis.effects) > 1
-    new = [listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or')
-           + (f' ({percent(-effect.share)})' if several else '')
-           for effect in diagnosis.effects if not effect.in_model]
+    new = []
+    for effect in diagnosis.effects:
+        title, rivals = _title(diagnosis, effect), _rivals(diagnosis, effect)
+        if effect.in_model:
+            continue
+        if len(diagnosis.effects) > 1:
+            other = (f', or {listed(rivals, "or")} in its place: the data do not separate these'
+                     if rivals else '')
+            new.append(f'{title} ({percent(-effect.share)}{other})')
+        else:
+            new.append(listed([title, *rivals], 'or'))
     return '; '.join([*([f'the model lacks {listed(new)}'] if new else []), *(
         _otherwise(diagnosis, effect) for effect in diagnosis.effects if effect.in_model)])
 

@@ -28,10 +28,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.constrained import Constrained, Inequalities, nearest
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import REACH, reach_of
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component
+from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.physics.effects.added_body import KEPT, MOMENTS, AddedBody
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
     FORCES,
@@ -103,21 +103,39 @@ class Constraints:
         blocks : mapping of Component to Block
             Columns of its effects.
         """
-        places, first = dict[Component, slice](), 0
-        index = list[int]()
-        for component, block in blocks.items():
-            if count := len(component.names):
-                start = fit.places[block].start
-                index += range(start, start + count)
-                places[component] = slice(first, first + count)
-                first += count
-        if not index:
+        places, index = _places(fit, blocks)
+        if not len(index):
             return fit
-        at = np.array(index)
-        found = self._nearest(places, fit.coefficients[at], fit.covariance[np.ix_(at, at)])
+        found = self._nearest(places, fit.coefficients[index],
+                              fit.covariance[np.ix_(index, index)])
         if found is None:
             return None
-        return regression.conditioned(fit, at, found.active) if len(found.active.b) else fit
+        return regression.conditioned(fit, index, found.active) if len(found.active.b) else fit
+
+    def refused(self, free: JointFit, fit: JointFit, blocks: Mapping[Component, Block],
+                sure: float) -> list[Component]:
+        """Return the components that no machine has in the values that fit best.
+
+        Where a coefficient is 0 at its limit, nothing is claimed that could be refused.
+
+        Parameters
+        ----------
+        free, fit : JointFit
+            Without the constraints and with them.
+        blocks : mapping of Component to Block
+            Columns of its effects.
+        sure : float
+            Standard deviations by which a free value must be beyond a limit.
+        """
+        places, index = _places(free, blocks)
+        if not len(index):
+            return []
+        limits, covariance = self._linear(places, len(index)), free.covariance[np.ix_(index, index)]
+        short = limits.b - limits.A @ free.coefficients[index]
+        std = np.sqrt(np.sum(limits.A @ covariance * limits.A, axis=1))
+        claimed = np.abs(fit.coefficients[index]) > ROUNDING * np.sqrt(np.diag(covariance))
+        beyond = np.any(limits.A[short > sure * std] * claimed, axis=0)
+        return [component for component, place in places.items() if np.any(beyond[place])]
 
     def _nearest(self, places: Mapping[Component, slice], mean: Array, covariance: Array,
                  ) -> Constrained | None:
@@ -201,45 +219,23 @@ class Constraints:
         return self._totals[drive, of]
 
 
+def _places(fit: JointFit, blocks: Mapping[Component, Block],
+            ) -> tuple[dict[Component, slice], Integers]:
+    """Return the places of components among all their coefficients, and of these in a fit."""
+    places, index = dict[Component, slice](), list[int]()
+    for component, block in blocks.items():
+        if count := len(component.names):
+            start = fit.places[block].start
+            places[component] = slice(len(index), len(index) + count)
+            index += range(start, start + count)
+    return places, np.array(index, dtype=int)
+
+
 def _given(component: Component) -> Array:
     """Return the input model's values of a component's coefficients, (k,)."""
     known = dict(zip((c.name for c in component.effect.coefficients), component.given,
                      strict=False))
     return np.array([known.get(name, 0.0) for name in component.names])
-
-
-def limits_reached(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:
-    """Return the limits that a component of a set reaches, each as a clause.
-
-    Parameters
-    ----------
-    design : Design
-    fitted : CandidateSet
-    component : Component
-        Of the set.
-    """
-    c, place = fitted.coefficients(component), ''
-    found = dict[str, None]()
-    if component.drive is not None:
-        place = f' of {design.drives[component.drive]}'
-        for name in component.names:
-            for of, way in ADDS_TO.get((component.effect.name, name), ()):
-                own = own_total(design, component.drive, of)
-                values = [fitted.coefficients(other)[k] + _given(other)[k]
-                          for other in fitted.blocks if other.drive == component.drive
-                          for k, other_name in enumerate(other.names)
-                          if (of, way) in ADDS_TO.get((other.effect.name, other_name), ())]
-                size = abs(own) + float(np.abs(values).sum())
-                if c[component.names.index(name)] < 0 and abs(own + sum(values)) <= 1e-9 * size:
-                    found[f'the {of}{place} would be less than 0 with what the model has'] = None
-    values_of = component.values(c)
-    for parameter in component.effect.linear:
-        bounded = parameter.of(units_of(design.given, component.drive).turns)
-        for bound in (bounded.lower, bounded.upper):
-            if bound and abs(values_of[parameter.name] - bound) <= 1e-9 * abs(bound):
-                found[f'the {parameter.name}{place} would be beyond {bound:g} '
-                      f'{bounded.unit}'] = None
-    return tuple(found)
 
 
 def own_total(design: Design, drive: int, of: str) -> float:

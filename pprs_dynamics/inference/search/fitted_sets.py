@@ -216,13 +216,21 @@ class FittedSets:
         block = fitted.blocks[component]
         if block.mean is not None:  # without it the shape goes, too
             return np.inf
-        # Without the constraints, which say nothing of the density at 0.
-        fit = (fitted.fit if fitted.terms.feasibility == 0
-               else self.regression.at(fitted.fit.blocks, fitted.fit.amplitudes))
+        fit = self.free(fitted)  # constraints say nothing of the density at 0
         place = fit.places[block]
         c, covariance = fit.coefficients[place], fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
                      + np.linalg.slogdet(block.precision)[1])
+
+    def free(self, fitted: CandidateSet) -> JointFit:
+        """Return the fit of a set without constraints, at its noise."""
+        return (fitted.fit if fitted.terms.feasibility == 0
+                else self.regression.at(fitted.fit.blocks, fitted.fit.amplitudes))
+
+    def refused(self, fitted: CandidateSet) -> list[Component]:
+        """Return the components that no machine has in the values that fit best."""
+        return self.constraints.refused(self.free(fitted), fitted.fit, fitted.blocks,
+                                        self.decisions.sure)
 
     def held(self, fitted: CandidateSet, index: Integers, values: Array) -> CandidateSet:
         """Return a set with some coefficients (k,) as given, all else fitted with them.
