@@ -119,6 +119,7 @@ def test_sentences_wrap_between_words_and_commands_stay_on_one_line() -> None:
     lines = as_text(stacked(sentence, verdict_panel('effect', 'cyan', sentence),
                             shell_command(command)), 80).splitlines()
     assert f'  {command}' in lines
+    assert as_text(shell_command(command), 80).splitlines() == [f'  {command}'], 'printed alone'
     text = [line.strip('│ ') for line in lines if command not in line and '─' not in line]
     assert max(map(len, text)) <= 80
     assert ' '.join(' '.join(text).split()) == ' '.join(f'{sentence}{sentence}'.split())

@@ -16,10 +16,9 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.arm_information import ArmInformation
 from pprs_dynamics.inference.experiments.motion_design import Motions, design
 from pprs_dynamics.inference.experiments.motion_limits import ArmLimits
-from pprs_dynamics.inference.experiments.next_experiment import commission_arm
+from pprs_dynamics.inference.experiments.next_experiment import ArmInformation, commission_arm
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_writer import write_model
 

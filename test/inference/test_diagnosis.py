@@ -16,7 +16,7 @@ from pprs_dynamics import DriveModel, simulate
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.experiments.platform_series import platform_motion
+from pprs_dynamics.inference.experiments.motion_design import platform_motion
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals

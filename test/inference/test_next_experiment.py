@@ -13,11 +13,14 @@ import pytest
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.inference.experiments.criteria import Information, whitened
-from pprs_dynamics.inference.experiments.motion_design import Motions, NoMotionError
+from pprs_dynamics.inference.experiments.motion_design import (
+    Motions,
+    NoMotionError,
+    platform_motion,
+)
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import PurposeError, next_experiment
-from pprs_dynamics.inference.experiments.platform_series import platform_motion
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,

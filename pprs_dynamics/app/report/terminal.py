@@ -83,7 +83,9 @@ def as_html(view: Any, width: int) -> str:
 
 def shell_command(command: str) -> Any:
     """Return a command that is printed on one line of any length, so that it can be copied."""
-    return _rich('text').Text(f'  {command}', style='bold cyan', no_wrap=True, overflow='ignore')
+    # In a group, as `print` joins texts into a new one that is wrapped.
+    return stacked(_rich('text').Text(f'  {command}', style='bold cyan', no_wrap=True,
+                                      overflow='ignore'))
 
 
 def verdict_panel(word: str, colour: str, text: str) -> Any:

@@ -14,7 +14,6 @@ from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.jobs import Jobs
 from pprs_dynamics.app.workbench.masks import shares_in, span_mask
-from pprs_dynamics.app.workbench.recordings import Recordings
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.ticks import Ticks
 from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
@@ -47,7 +46,6 @@ class Session:
     Attributes
     ----------
     ticks : Ticks
-    recordings : Recordings
     jobs : Jobs
 
     Raises
@@ -61,7 +59,7 @@ class Session:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')
         self.ticks = Ticks(model, inputs or Inputs(model, recordings, {}))
-        self.recordings, self.jobs = Recordings(self.ticks), Jobs(self.ticks)
+        self.jobs = Jobs(self.ticks)
 
     @classmethod
     def open(cls, recordings: Sequence[str | PathLike[str]],
@@ -78,7 +76,7 @@ class Session:
             Where a file cannot be read, or repeats another one; as `read_reference`.
         """
         session = cls.of(Inputs.read(model, recordings, validation).since(reference))
-        session.recordings.find_mistakes()
+        session.ticks.change_recordings(Inputs.checked)
         return session
 
     @classmethod
@@ -104,7 +102,7 @@ class Session:
         saved = SavedSession.read(path)
         session = cls.of(saved.inputs)
         session.resume(saved)
-        session.recordings.find_mistakes()
+        session.ticks.change_recordings(Inputs.checked)
         return session
 
     def resume(self, saved: SavedSession) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from threading import RLock
+from threading import Lock, RLock
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench import view_state
@@ -63,7 +63,7 @@ class Ticks:
 
     def __init__(self, model: DriveModel, inputs: Inputs) -> None:
         self.inputs, self.revision = inputs, 0
-        self._lock, self._settling = RLock(), RLock()
+        self._lock, self._settling, self._changing = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
         self._done: list[Moment] = []
         self._undone: list[Moment] = []
@@ -93,18 +93,26 @@ class Ticks:
                             fits.model), tick.chosen)
             self.notify()
 
-    def take(self, inputs: Inputs) -> None:
-        """Replace the recordings; model and ticks remain."""
-        while True:
-            fits = self.fits
-            if [*inputs.recordings] != [*self.inputs.recordings]:
-                fits = self.fits_of(self.model, inputs)
-            with self._lock:
-                if fits.model is self.model:  # else the model was changed meanwhile
-                    self.inputs = inputs
-                    if fits is not self.fits:
-                        self.use(fits, self.view.ticks)
-                    break
+    def change_recordings(self, change: Callable[[Inputs], Inputs]) -> None:
+        """Replace the recordings by what a function returns for them; model and ticks remain.
+
+        Raises
+        ------
+        PprsError
+            Of the function; where the model cannot follow a recording.
+        """
+        with self._changing:
+            inputs = change(self.inputs)
+            while True:
+                fits = self.fits
+                if [*inputs.recordings] != [*self.inputs.recordings]:
+                    fits = self.fits_of(self.model, inputs)
+                with self._lock:
+                    if fits.model is self.model:  # else the model was changed meanwhile
+                        self.inputs = inputs
+                        if fits is not self.fits:
+                            self.use(fits, self.view.ticks)
+                        break
         self.notify()
 
     # Listeners

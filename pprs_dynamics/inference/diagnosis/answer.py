@@ -57,7 +57,7 @@ from pprs_dynamics.inference.search.held_out import (
     hold_out,
     predictive_gain,
 )
-from pprs_dynamics.inference.search.noise_floors import noise_at_most, noise_floors
+from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -109,7 +109,7 @@ class Answer:
         # The residual of the reported set is an upper bound of the noise.
         most = {self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
                 for d in self.fits.regression.drives}
-        known = noise_floors(table.first, reported=table.reported.fit)
+        known = table.noise_floors
         self.noise_levels = {name: noise_at_most(known.get(name, np.inf), bound)
                              for name, bound in most.items()}
         self.unseen = tuple(name for name in most if name not in known)

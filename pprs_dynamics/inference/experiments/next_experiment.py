@@ -16,7 +16,6 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.arm_information import ArmInformation
 from pprs_dynamics.inference.experiments.columns import FittedTerm
 from pprs_dynamics.inference.experiments.criteria import Precision
 from pprs_dynamics.inference.experiments.motion_design import Motions, design
@@ -30,6 +29,7 @@ from pprs_dynamics.inference.experiments.question import (
     precision_of,
     question_of,
 )
+from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
@@ -39,6 +39,9 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 
+ARM_SAMPLES = 150  # of a motion
+ARM_NOISE = 0.01  # of a joint's largest effort, standard deviation where the model knows no other
+ARM_FRICTION = 0.1  # of a joint's largest effort, to which friction and offset are known
 PURPOSES = (SEPARATE, COMMISSION)
 SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
@@ -266,6 +269,41 @@ def design_experiment(question: Question, motions: Motions, seed: int,
                                            for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
         best.duration, lambda time: motions.sampled(best, time), question.plan.model)
+
+
+class ArmInformation:
+    """Information of motions about an arm's parameters.
+
+    Parameters
+    ----------
+    model : DriveModel
+    limits : ArmLimits
+    """
+
+    def __init__(self, model: DriveModel, limits: Any) -> None:
+        self.model, self.effort = model, limits.efforts(model)
+        bodies = Bodies(model.robot.inertial)
+        origin, step = np.zeros(len(bodies)), 1e-6
+        self.described = bodies.inertial(origin).ravel()
+        self.slopes = np.column_stack([
+            (bodies.inertial(origin + step * unit).ravel() - self.described) / step
+            for unit in np.eye(len(bodies))])
+
+    def of(self, series: JointSeries) -> Array:
+        """Return the squared gain in precision of each combination over the description."""
+        motion = series.motion(np.linspace(0, series.duration, ARM_SAMPLES))
+        count = len(self.effort)
+        rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
+        efforts = np.abs(rows @ self.described).max(axis=0)
+        largest = np.where(np.isfinite(self.effort), self.effort, np.maximum(efforts, 1e-3))
+        # Inertia of the rotor, viscous friction, dry friction and offset, each of its joint alone.
+        each = np.stack((motion.acceleration, motion.velocity, np.tanh(
+            motion.velocity / np.asarray(self.model.reversal.velocity)),
+            np.ones_like(motion.velocity)), axis=2) * ARM_FRICTION * largest[:, None]
+        own = np.einsum('njk,ji->njik', each, np.eye(count)).reshape(ARM_SAMPLES, count, -1)
+        columns = np.concatenate((rows @ self.slopes, own), axis=2) / (ARM_NOISE * largest)[:, None]
+        J = columns.reshape(-1, columns.shape[2])
+        return np.maximum(np.linalg.eigvalsh(J.T @ J), 0.0)
 
 
 def commission_arm(motions: Motions, seed: int,

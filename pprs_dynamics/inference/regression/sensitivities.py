@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION, Forces
@@ -33,6 +34,7 @@ from pprs_dynamics.system.parallel import each
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
+BLOCK = 200  # samples whose motion fits into a processor's cache, 10 kB each
 HOMING_TIME = 0.01  # [s]; columns of wrong zeros change slowly between reversals
 SLOWER = 4  # times as slowly do inertias
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
@@ -314,6 +316,8 @@ class Sensitivities:
                       ) -> tuple[Array, Array]:
         """Return columns per unit of each coefficient, around values that the model has.
 
+        Block by block: all coefficients read the same motion, which the cache then holds.
+
         As the model says, and as they would be if friction did not follow the loads that the
         effect adds (a preloaded guide). Those of bodies are around none: `AddedBody.around` makes
         them exact for where one is.
@@ -324,22 +328,38 @@ class Sensitivities:
             present = None
         values = effect.to_coefficients(present.values) if present is not None else {}
 
-        def columns(coefficient: Parameter) -> tuple[Array, Array]:
-            step = coefficient.scale
-            moved: Any = effect.at({**values, coefficient.name:
-                                    values.get(coefficient.name, 0.0) + step})
-            if not isinstance(moved, BodyEffect):
-                before = effect.at(values) if present is None else present
-                change = self.sensed((moved.force(state) - before.force(state)) / step, state)
-                return change, change
-            found = moved.apply(state) if present is None else self._at(replace(
-                self.model, effects=tuple(moved if effect is present else effect
-                                          for effect in self.model.effects)), state)
-            return (self.sensed((self._efforts(self.model, found) - reference) / step, state),
-                    self.sensed((found.rigid_force - state.rigid_force) / step, state))
+        def of_block(rows: slice) -> tuple[list[Array], list[Array]]:
+            part = self._part(state, rows)
+            before = (None if issubclass(effect, BodyEffect)
+                      else (effect.at(values) if present is None else present).force(part))
 
-        full, bare = zip(*self.each(columns, effect.coefficients), strict=True)
-        return np.stack(full), np.stack(bare)
+            def change(coefficient: Parameter) -> tuple[Array, Array]:
+                step = coefficient.scale
+                moved: Any = effect.at({**values, coefficient.name:
+                                        values.get(coefficient.name, 0.0) + step})
+                if before is not None:
+                    more = (moved.force(part) - before) / step
+                    return more, more
+                found = moved.apply(part) if present is None else self._at(replace(
+                    self.model, effects=tuple(moved if effect is present else effect
+                                              for effect in self.model.effects)), part)
+                return ((self._efforts(self.model, found) - reference[rows]) / step,
+                        (found.rigid_force - part.rigid_force) / step)
+
+            full, bare = zip(*map(change, effect.coefficients), strict=True)
+            return list(full), list(bare)
+
+        size = BLOCK if self.model.robot.structure is not None else len(reference)
+        full, bare = (np.concatenate(blocks, axis=1) for blocks in zip(*self.each(
+            of_block, (slice(first, first + size) for first in range(0, len(reference), size))),
+            strict=True))
+        return self._sensed_each(full, state), self._sensed_each(bare, state)
+
+    @staticmethod
+    def _part(state: Any, rows: slice) -> Any:
+        """Return some samples of a motion, with their kinematics as they are known."""
+        return replace(state[rows], known=state.links.part(rows)) if isinstance(
+            state.links, LinkMotion) else state
 
 
 def following(model: DriveModel) -> list[Effect]:

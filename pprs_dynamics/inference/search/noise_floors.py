@@ -52,8 +52,13 @@ def noise_floors(fits: FittedSets, period: float | None = None,
     """
     regression, residuals = fits.regression, fits.design.residuals
     fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
-    seen = np.all([_shares_seen(fits, fit, noise.amplitudes) >= fits.decisions.noise_seen
-                   for noise in (fit, reported or fit)], axis=0)
+    # Degrees of freedom that the columns leave, and the shares of both noises that lie there.
+    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).solve(
+        fit.spectra, regression.counts).leverage, 0.0)
+    powers = [noise.amplitudes @ regression.noise_shapes.at_bands for noise in (
+        fit, reported or fit)]
+    seen = np.all([np.sum(free * power, axis=1) >= fits.decisions.noise_seen * np.sum(
+        regression.counts * power, axis=1) for power in powers], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
     return {fits.design.drives[d]: float(np.sqrt(max(
@@ -126,14 +131,3 @@ def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
     order = np.argsort(-values)[:MOST_DIRECTIONS]
     kept = order[values[order] > LEAST_DIRECTION ** 2 * max(float(values[-1]), 1e-300)]
     return axes[:, kept].T @ rows
-
-
-def _shares_seen(fits: FittedSets, fit: JointFit, amplitudes: Array) -> Array:
-    """Return the share of a noise where a fit's columns leave degrees of freedom, (D,)."""
-    regression = fits.regression
-    leverage = NormalEquations(regression, fit.blocks).solve(fit.spectra,
-                                                             regression.counts).leverage
-    power = amplitudes @ regression.noise_shapes.at_bands
-    free = np.maximum(regression.counts - leverage, 0.0)
-    shares: Array = np.sum(free * power, axis=1) / np.sum(regression.counts * power, axis=1)
-    return shares

@@ -38,6 +38,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.search import Search, of_same_names, patterns_of
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
@@ -183,6 +184,11 @@ class ModelTable:
     def reported(self) -> CandidateSet:
         """The reported set in the last search, for what compares sets there."""
         return self.last.evaluate(self.best.fitted.candidates)
+
+    @cached_property
+    def noise_floors(self) -> dict[str, float]:
+        """The rms of the noise of each drive [N], where the recordings determine it."""
+        return noise_floors(self.first, reported=self.reported.fit)
 
     def without(self, candidate: EffectCandidate) -> Row:
         """Return the cheapest row that lacks an effect."""

@@ -18,7 +18,6 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_equations import (
     OPEN_IN_MOTION,
     WORST_CONDITION,
-    joint_friction,
     residual,
 )
 from pprs_dynamics.physics.mechanism.tree_evaluation import samples_last
@@ -63,6 +62,10 @@ class LinkMotion:
             found._require_regular()
         found._require_closed()
         return found
+
+    def part(self, samples: slice) -> LinkMotion:
+        """Return the motion of some samples."""
+        return LinkMotion(self.structure, self.rows[samples])
 
     @cached_property
     def motion(self) -> Data:
@@ -143,14 +146,7 @@ class LinkMotion:
 
     def friction(self, loads: Loads, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints under loads, (N, D)."""
-        t = self.structure.tables
-        found = np.zeros((len(self.rows), len(t.drives)))
-        m, o = samples_last(self.motion), samples_last(loads)
-        # Loads are everybody's: what is of one friction alone does not go through them.
-        o = o._replace(tau_friction=np.empty_like(o.tau_friction))
-        with np.errstate(all='ignore'):
-            joint_friction(t, m, o, friction, found.T)
-        return found
+        return self.structure.evaluation.joint_friction(self.rows, loads, friction)
 
     @property
     def tool_velocity(self) -> Array:

@@ -133,6 +133,18 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
     return -1
 
 
+def _rub(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
+         rubbing: Any, resistance: Any, of_tree: Any, efforts: Any) -> None:
+    """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
+    t = elements(read_tables(sizes, integers, reals))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
+                                      resistance[2], resistance[3]))
+    for s in range(len(efforts)):
+        m = elements(read_motion(sizes, motions[s], reals))
+        o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
+        joint_friction(t, m, o, friction, efforts[s])
+
+
 class Evaluation:
     """A mechanism's equations for what it is given.
 
@@ -211,6 +223,29 @@ class Evaluation:
             o.n[:, joint] += moment
         self._run(None, None, rows, FORCES | KEPT, gravity, None, inertial, loads)
         return o
+
+    def joint_friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
+        """Return the drives' efforts against friction of joints under loads, (N, D).
+
+        Parameters
+        ----------
+        rows : (N, K) array
+            See `forward_kinematics`.
+        loads : Loads
+        friction : JointFriction
+        """
+        found = np.zeros((len(rows), len(self.tables.drives)))
+        # Loads are everybody's: what is of one friction alone does not go through them.
+        loop = compiled_or_none(_rub, len(rows))
+        if loop is not None:
+            loop(*self.packed, rows, loads.links, loads.loops, np.array(friction[:2]),
+                 np.array(friction[2:]), np.empty(len(self.home)), found)
+            return found
+        m, o = samples_last(self.motion(rows)), samples_last(loads)
+        with np.errstate(all='ignore'):
+            joint_friction(self.tables, m, o._replace(tau_friction=np.empty_like(o.tau_friction)),
+                           friction, found.T)
+        return found
 
     def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
                          gravity: Array, friction: JointFriction,

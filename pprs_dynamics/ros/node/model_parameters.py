@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -20,7 +21,6 @@ from pprs_dynamics.physics.model.keys import (
     NODE_KEYS,
     NODE_PREFIXES,
 )
-from pprs_dynamics.ros.node.model_history import ModelHistory
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
@@ -32,6 +32,7 @@ from pprs_dynamics.ros.node.parameters import (
     with_hint,
 )
 
+MOST_CHANGES = 100  # that are remembered
 Checked = TypeVar('Checked')
 DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
                       'demonstrations', stays=True)
@@ -81,6 +82,50 @@ def follow(node: Node, validate: Callable[[list[Parameter]], Checked],
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(changed)
     return checked[0]
+
+
+class ModelHistory:
+    """Parameters of a node as they were before each change of its model.
+
+    Parameters
+    ----------
+    node : Node
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node, self._is_restoring = node, False
+        self._before: list[list[Parameter]] = []
+        node.create_service(Trigger, '~/restore', self._restore)
+
+    def __len__(self) -> int:
+        return len(self._before)
+
+    def note(self, before: Mapping[str, Any], changed: Iterable[Parameter]) -> None:
+        """Remember the values that the changed parameters had.
+
+        A parameter that was new has no value to return to. It has no effect either, once the list
+        of effects is as it was.
+        """
+        if not self._is_restoring:
+            self._before = [*self._before, [
+                Parameter(each.name, value=before[each.name])
+                for each in changed if each.name in before]][-MOST_CHANGES:]
+
+    def _restore(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not self._before:
+            response.message = 'nothing to restore: the model was not changed since the start'
+            return response
+        self._is_restoring = True
+        try:
+            result = self._node.set_parameters_atomically(self._before[-1])
+        finally:
+            self._is_restoring = False
+        if result.successful:
+            self._before.pop()
+        response.success = result.successful
+        response.message = result.reason or 'the model is as it was before the last change'
+        self._node.get_logger().warning(f'restore: {response.message}')
+        return response
 
 
 class ModelParameters:

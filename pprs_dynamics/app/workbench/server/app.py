@@ -58,7 +58,8 @@ CHANGES: dict[str, Callable[[Session, Fields], object]] = {
     'release': lambda session, body: session.ticks.release(body.text('effect'), body.revision()),
     'back': lambda session, body: session.ticks.back(body.revision()),
     'forward': lambda session, body: session.ticks.forward(body.revision()),
-    'remove': lambda session, body: session.recordings.remove(body.text('name')),
+    'remove': lambda session, body: session.ticks.change_recordings(
+        lambda inputs: inputs.without(body.text('name'))),
     'adopt': lambda session, body: session.jobs.adopt(
         body.text('effect'), revision=body.revision()),
     'cancel': lambda session, body: session.jobs.cancel(body.text('kind')),

@@ -130,7 +130,7 @@ class Hub:
         Raises
         ------
         PprsError
-            As `Recordings.add`.
+            As `Inputs.with_more`; where the model cannot follow the recording.
         """
         with self._opening:
             if self.session is None:
@@ -139,7 +139,8 @@ class Hub:
                                        'not be held out')
                 self._use(Session.of(self.inputs.with_more(path)))
             else:
-                self.session.recordings.add(path, is_held_out)
+                self.session.ticks.change_recordings(
+                    lambda inputs: inputs.with_more(path, is_held_out))
         self._changed()
 
     @contextmanager
@@ -227,7 +228,7 @@ class Hub:
         if self.session is not None and self._is_unjudged:
             self._is_unjudged = False
             try:
-                self.session.recordings.find_mistakes()
+                self.session.ticks.change_recordings(Inputs.checked)
             except PprsError as error:
                 self.failure = str(error)
                 self.notify()
