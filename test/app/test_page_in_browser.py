@@ -120,5 +120,5 @@ def test_the_next_command_is_copied_with_the_real_names(see: Any) -> None:
     seen.tab.click('.next button')
     seen.tab.wait_for_function("document.querySelector('.next button').textContent === 'Copied'")
     assert seen.tab.evaluate('navigator.clipboard.readText()') == (
-        "pprs adopt coulomb_friction 'my run.mcap' --validate other.mcap --output "
-        'with_coulomb_friction.yaml')
+        "pprs adopt coulomb_friction 'my run.mcap' --validate other.mcap --model MODEL.yaml "
+        '--output with_coulomb_friction.yaml')
