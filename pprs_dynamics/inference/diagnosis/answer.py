@@ -155,10 +155,10 @@ class Answer:
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
             tuple(self._ranked_set(row.fitted, row.terms) for row in table.rows[:MOST_SETS]),
             self._barred(), tuple(moved),
-            find_cautions(table.last, table.reported, effects), first.notes, first.given,
-            self.adopted, self.given, self.remaining, self.noise, self.noise_levels,
-            root_mean_square(list(self.noise_levels.values())), refit, above, little, self.unseen,
-            'validation' if self.validate else 'blocks', selection=table,
+            find_cautions(table.last, table.reported, effects, self.noise_levels),
+            first.notes, first.given, self.adopted, self.given, self.remaining, self.noise,
+            self.noise_levels, root_mean_square(list(self.noise_levels.values())), refit, above,
+            little, self.unseen, 'validation' if self.validate else 'blocks', selection=table,
             decisions=self.decisions)
 
     # Effects

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component
+from pprs_dynamics.inference.search.fitted_model import reversal_forces
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -22,10 +23,12 @@ from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 
 def find_cautions(
     fits: FittedSets, best: CandidateSet, effects: Sequence[FoundEffect],
+    noise_levels: Mapping[str, float],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_length(fits, best), *_motion(fits), *_filtered(fits),
-            *_second_encoders(fits, effects), *_unexcited(fits, best), *_one_load(fits, effects))
+            *_reversals(fits, best, noise_levels), *_second_encoders(fits, effects),
+            *_unexcited(fits, best), *_one_load(fits, effects))
 
 
 def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
@@ -56,6 +59,18 @@ def _motion(fits: FittedSets) -> Iterator[str]:
     if one_way:
         yield (f'{listed(one_way)} moved in one direction only: friction there looks like a '
                'constant force; record motion both ways')
+
+
+def _reversals(fits: FittedSets, best: CandidateSet, noise_levels: Mapping[str, float],
+               ) -> Iterator[str]:
+    """Yield the drives whose friction reverses in another width than the model's."""
+    forces = reversal_forces(fits, best)
+    wrong = [fits.design.drives[d] for d in fits.regression.drives
+             if root_mean_square(forces[:, d]) > noise_levels[fits.design.drives[d]]]
+    if wrong:
+        yield (f'friction of {listed(wrong)} seems to reverse over another range of velocities '
+               'than in the model, and that part of the error remains: pprs fit estimates '
+               'friction.reversal_velocities')
 
 
 def _second_encoders(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
