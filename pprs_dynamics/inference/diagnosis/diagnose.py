@@ -140,8 +140,7 @@ def other_mounting(model: DriveModel, recordings: Sequence[Recording],
                        for G, y, now in zip(rows, targets, before, strict=True) if np.any(G))
     norm = float(np.linalg.norm(share))
     tilt = float(np.arccos(np.clip(share @ given / max(norm * size, 1e-300), -1.0, 1.0)))
-    if (abs(norm - 1) > SAME_SIZE or tilt < LEAST_TILT
-            or not is_explained):
+    if abs(norm - 1) > SAME_SIZE or tilt < LEAST_TILT or not is_explained:
         return {}
     found, said = (', '.join(f'{round(value, 1) + 0.0:.1f}' for value in vector)
                    for vector in (size * share.round(3), given))

@@ -44,10 +44,9 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.physics.three_pprs.tree import structure_of, tree_structure
+from pprs_dynamics.physics.three_pprs.tree import HOME_HEIGHT, structure_of, tree_structure
 
 RODS = 'rods'
-HOME_HEIGHT = 0.5  # [m], of the platform at home
 POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.

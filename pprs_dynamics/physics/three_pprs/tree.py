@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 
-HOME_HEIGHT = 0.5  # of the platform [m]
+HOME_HEIGHT = 0.5  # [m], of the platform at home
 UNLOADED = Masses(1.0, 0.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 6)
 
 

@@ -11,10 +11,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
-from trajectory_msgs.msg import (
-    JointTrajectory,
-    MultiDOFJointTrajectory,
-)
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -33,7 +30,10 @@ from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk, aligned
 
+TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
+REJECT, SPLINE = 'reject', 'spline'
 TWO_WORDS = struct.Struct('<2I')
+Motion = PlatformMotion | JointMotion
 
 
 class Points(NamedTuple):
@@ -124,11 +124,6 @@ def _text(data: bytes) -> str:
     if data[-1:] != b'\0':
         raise ValueError(data)
     return data[:-1].decode()
-
-
-TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
-REJECT, SPLINE = 'reject', 'spline'
-Motion = PlatformMotion | JointMotion
 
 
 class TrajectoryRequest(NamedTuple):
