@@ -110,7 +110,7 @@ def adopt(
             found = _with_effect(case, request)
         except (ModelError, PlacementError) as error:
             force = False
-            found = case.adoption(request, model, (), None, (
+            found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
@@ -190,25 +190,26 @@ class _Case:
         return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
 
     def adoption(self, request: EffectRequest | CurveRequest, after: DriveModel,
-                 held_out: Sequence[float], gain: PredictiveGain | None,
-                 objections: tuple[str, ...]) -> Adoption:
+                 residuals: Sequence[Residuals], held_out: Sequence[float],
+                 gain: PredictiveGain | None, objections: tuple[str, ...]) -> Adoption:
         """Return the undecided adoption of a model, with all objections.
 
         Parameters
         ----------
         request : EffectRequest or CurveRequest
         after : DriveModel
+        residuals : (before, after)
+            On the recordings.
         held_out : (before, after)
             Errors on blocks of the recordings [N]; on validation recordings they are computed.
         gain : PredictiveGain or None
             On held-out data.
         objections : tuple of str
         """
-        before, with_it = self.residuals(self.recordings, self.model, after)
+        before, with_it = residuals
         errors = [rms(before), rms(with_it)]
         if self.validate:
-            held_out = [rms(residuals) for residuals in self.residuals(
-                self.validate, self.model, after)]
+            held_out = [rms(each) for each in self.residuals(self.validate, self.model, after)]
         if after is not self.model:
             objections += (
                 self.objections(predictive_gain(before, with_it), errors, 'the recordings',
@@ -242,11 +243,12 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     impossible = (f'the values of {request.name} that fit best are impossible'
                   f'{places and f" on {places}"}: beyond its bounds, or more is taken away than '
                   'the model has',) if refused else ()
+    residuals = case.residuals(case.recordings, case.model, after)
     pushing = () if gone or not request.effect.is_friction else _of_friction(
-        effect, after, measure_residuals(after, case.recordings)[0])
-    found = case.adoption(request, after, (effect.held_out_before, effect.held_out_after),
-                          effect.gain, (*_of_table(case, request, row, effect),
-                                        *impossible, *pushing))
+        effect, after, residuals[-1])
+    found = case.adoption(
+        request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
+        (*_of_table(case, request, row, effect), *impossible, *pushing))
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(margin)
         if request.name in (*rival.missing, *rival.instead)
@@ -340,7 +342,7 @@ def _with_curve(case: _Case, request: CurveRequest, report: Callable[[float], No
         remarks.append(f'The recordings also show {others}: adopt causes first, a curve in their '
                        'place is valid for this motion only')
     return replace(
-        case.adoption(request, after, (rms(given), rms(found)), predictive_gain(given, found),
-                      against),
+        case.adoption(request, after, case.residuals(case.recordings, model, after),
+                      (rms(given), rms(found)), predictive_gain(given, found), against),
         parameters=fitted.parameters(drive, start.units_of(drive).effort), curve=fitted,
         remarks=tuple(remarks))
