@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Efforts without a sign, and units and signs that change in the middle, are told as that."""
+"""Efforts without a sign, and positions whose unit changes, are reported as that."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import time
 from typing import Any
 
 import numpy as np
-import pytest
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.evidence import Evidence
 from pprs_dynamics.inference.readings.findings import OtherReading
-from pprs_dynamics.inference.residuals.excerpt import excerpt_of, forces_on
+from pprs_dynamics.inference.readings.table import plain
+from pprs_dynamics.inference.residuals.excerpt import excerpt_of
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 MODEL = DriveModel.load()
@@ -46,23 +47,6 @@ def test_efforts_without_a_sign_are_told_within_seconds() -> None:
     assert 'absolute value' in one.text
 
 
-@pytest.mark.parametrize(('factor', 'is_after', 'words'), [
-    (1e3, True, 'in mN'), pytest.param(-1.0, False, 'negated', marks=pytest.mark.slow)])
-def test_efforts_that_change_their_unit_in_the_middle(factor: float, is_after: bool, words: str,
-                                                      ) -> None:
-    part = AFTER if is_after else ~AFTER
-    one, = told(effort=EFFORT * np.where(part, factor, 1.0))
-    assert words in one.text
-    assert 'unlike in the rest' in one.text
-
-
-def test_one_drive_that_is_negated_from_a_time_on_is_named() -> None:
-    effort = EFFORT.copy()
-    effort[AFTER[:, 0], 2] *= -1
-    one, = told(effort=effort)
-    assert one.drives == ('slide_3',)
-
-
 def test_positions_that_change_to_millimetres_are_in_another_unit() -> None:
     assert any('millimetres' in one.text for one in told(position=POSITION * np.where(
         AFTER, 1e3, 1.0)))
@@ -75,8 +59,8 @@ def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     position[:held] = position[held]
     excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort), 3)
     assert excerpt is not None
-    forces = forces_on(MODEL, excerpt.motion, excerpt.time)
-    assert forces is not None
-    effort[:held] = forces[excerpt.time < TIME[held // 2]][-1]
+    evidence = Evidence.of(MODEL, excerpt, plain(6))
+    assert evidence is not None
+    effort[:held] = evidence.force[excerpt.time < TIME[held // 2]][-1]
     effort[:held, 1] = 20.0
     assert told(position, effort) == []

@@ -3,36 +3,31 @@
 
 """Whether a recording has the units, signs and order of drives that a model file says.
 
-The recording is read in every way of `table.py`, and what is more likely than the plain reading
-is reported with the line that says so. Nothing is ever changed.
+The recording is read in the ways of `table.py`, and a way that is more likely than the plain
+reading is reported with the line that says so. Nothing is ever changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.efforts import (
-    constants_reading,
-    find_changed_efforts,
     find_no_measurements,
-    find_scales,
     find_sign_bit,
-    unit_reading,
+    find_unsigned,
 )
 from pprs_dynamics.inference.readings.evidence import (
-    Parts,
+    Evidence,
+    Likelihood,
     Shares,
     effort_contents,
-    likelihood,
-    parts_of,
     read_motion,
-    rigid_factor,
 )
 from pprs_dynamics.inference.readings.findings import OtherReading, Scales, columns_line
 from pprs_dynamics.inference.readings.table import Reading, named, plain, quarter_turn, readings
@@ -47,30 +42,38 @@ from pprs_dynamics.system.plain_yaml import scalar
 
 @dataclass(frozen=True)
 class Fit:
-    """A reading with its score, the scale of each drive's efforts and the mean residual."""
+    """A reading with its score, the scale of each drive's efforts and its residuals.
+
+    Parameters
+    ----------
+    reading : Reading
+    time_unit : float
+        [s].
+    score : float
+        [nats].
+    scales : (D,) array
+        Of the efforts, as multiples of those in SI units.
+    what : str
+        What the scales are, where they are of no single unit.
+    left, most_left : float
+        Mean residual and the largest of a drive, over the squared effort.
+    prior : float
+        Largest prior cost of a drive [nats].
+    """
 
     reading: Reading
     time_unit: float
     score: float
     scales: Array
-    left: float
+    what: str = ''
+    left: float = 1.0
+    most_left: float = 1.0
+    prior: float = 0.0
 
     @property
     def is_plain(self) -> bool:
         """Whether it is the reading by names and units."""
         return not self.reading.kind and self.time_unit == 1 and bool(np.all(self.scales == 1))
-
-    @property
-    def is_other_unit(self) -> bool:
-        """Whether only efforts differ, those of all drives by one unit or by drive constants."""
-        sizes = np.abs(self.scales)
-        return not self.reading.kind and self.time_unit == 1 and (self.has_constants or bool(
-            np.all(sizes == sizes[0]) and sizes[0] != 1))
-
-    @property
-    def has_constants(self) -> bool:
-        """Whether efforts are multiplied by constants of the drives."""
-        return not np.all(np.isin(self.scales, table.SCALES))
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -103,25 +106,22 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
         return found
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
                 if (excerpt := excerpt_of(recording, table.STRETCHES, unit)) is not None}
-    if wrong := [*_of_rate(model, recording, excerpts.get(1.0))]:
+    excerpt = excerpts.get(1.0)
+    if wrong := [*_of_rate(model, recording, excerpt)]:
         return tuple(wrong)
     search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
     best = search.best()
-    rival = None if best is None else search.rival(best)
-    if best is not None and best.is_other_unit and rival is None:
-        best = None  # `find_scales` compares the factors themselves
-    contents = effort_contents(model, recording, excerpts.get(1.0))
+    likely = [] if best is None else [best, *search.rivals(best)]
     has_columns = model.recorded.columns is not None
     mistakes: list[Defect] = [] if best is None else list(_of_fit(model, recording, best))
-    if best is not None and rival is not None:
-        both = [[*_of_fit(model, recording, fit)] for fit in (best, rival)]
+    if len(likely) > 1:
+        each_of = [[*_of_fit(model, recording, fit)] for fit in likely]
         mistakes = [OtherReading.of(
             'ambiguous', model.drives, range(len(model.drives)), ', or '.join(
-                ' and '.join(mistake.what for mistake in each) for each in both),
-            ' or '.join(columns_line(each, has_columns) for each in both))]
+                ' and '.join(mistake.what for mistake in each) for each in each_of),
+            ' or '.join(filter(None, (line for each in each_of for line in (
+                columns_line(each, has_columns), *(mistake.line for mistake in each))))))]
     kinds = {mistake.kind for mistake in mistakes}
-    if not mistakes:
-        mistakes += find_scales(model, contents)
     if not kinds & {'position_unit', 'drive_order', 'ambiguous'}:
         # Angles that explain the efforts well are in the right unit, whatever limits say.
         mistakes += _of_strokes(model, recording, search.strokes,
@@ -129,10 +129,13 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += _of_velocities(model, recording, excerpts.get(
             1.0 if best is None else best.time_unit))
-    for last in (find_changed_efforts(model, recording, excerpts.get(1.0)),
-                 find_no_measurements(model, contents)):
-        if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
-            mistakes += last
+    evidence = search.evidence(plain(len(model.drives)), 1.0)
+    if evidence is None or excerpt is None or any(
+            isinstance(mistake, OtherReading) for mistake in mistakes):
+        return tuple(mistakes)
+    mistakes += find_unsigned(model, recording, excerpt, evidence)
+    if not mistakes:
+        mistakes += find_no_measurements(model, effort_contents(model, recording, evidence))
     return tuple(mistakes)
 
 
@@ -151,13 +154,24 @@ class Search:
     def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt],
                  are_counts: bool = False) -> None:
         self.model, self.excerpts, self.are_counts = model, excerpts, are_counts
-        # Of currents without a known gain no force is known: masses say nothing.
-        self.masses = np.inf if model.effort_kind == CURRENT and not model.knows_currents else (
-            table.MASSES)
+        # Of currents without a known gain no force is known: masses and units say nothing.
+        self.has_gain = model.effort_kind != CURRENT or model.knows_currents
+        self.masses = table.MASSES if self.has_gain else np.inf
         self.plain_left = 1.0  # residual of the plain reading
         self.fits: list[Fit] = []
-        self._parts: dict[tuple[float, bytes, bytes], Parts | None] = {}
+        self._evidence: dict[tuple[float, bytes], Evidence | None] = {}
         self.strokes = self._strokes()
+
+    def evidence(self, reading: Reading, unit: float) -> Evidence | None:
+        """Return the evidence of a reading; the plain motion may be followed in pieces."""
+        is_plain = not reading.kind and unit == 1
+        key = unit, np.concatenate([reading.scale, reading.offset, reading.positions, (
+            [] if reading.gravity is None else reading.gravity)]).tobytes()
+        if key not in self._evidence:
+            excerpt = self.excerpts.get(unit)
+            self._evidence[key] = None if excerpt is None else Evidence.of(
+                mounted(self.model, reading.gravity), excerpt, reading, in_pieces=is_plain)
+        return self._evidence[key]
 
     def _strokes(self) -> tuple[Array, Array]:
         """Return the ends of the strokes, infinite where a drive turns freely.
@@ -165,13 +179,11 @@ class Search:
         Limits of a turn or more of a motor without weight are invented, as URDF asks for some.
         """
         lower, upper = self.model.limits.strokes
-        excerpt = self.excerpts.get(1.0)
-        parts = None if excerpt is None else parts_of(
-            self.model, excerpt, plain(len(lower)), in_pieces=True)
-        if parts is None:
+        evidence = self.evidence(plain(len(lower)), 1.0)
+        if evidence is None:
             return lower, upper
         free = np.array([units.turns for units in self.model.units]) & (
-            upper - lower >= 2 * np.pi) & (np.nanmax(np.abs(parts.gravity), axis=0) == 0)
+            upper - lower >= 2 * np.pi) & (np.linalg.norm(evidence.roots[:, 0, :, 1], axis=1) == 0)
         return np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
 
     def best(self) -> Fit | None:
@@ -179,24 +191,32 @@ class Search:
         drives = self.model.drives
         first = plain(len(drives))
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
-        start = self.fit(first, 1.0, in_pieces=True) or Fit(
-            first, 1.0, 0.0, np.ones(len(drives)), 1.0)
-        self.plain_left = start.left
-        if 1.0 in self.excerpts and start.left < 1.5 * table.CLOSEST and start.is_plain and not (
-                self._outside(first, self.excerpts[1.0])):
+        start = self.fit(first, 1.0) or Fit(first, 1.0, 0.0, np.ones(len(drives)))
+        self.plain_left, self.fits = start.left, [start]
+        is_inside = 1.0 in self.excerpts and not self._outside(first, self.excerpts[1.0])
+        # Without masses a gravity of any size may explain positions in another unit.
+        explains = is_inside and start.is_plain and self.has_gain and (
+            start.prior < table.PLAUSIBLE)
+        if explains and start.most_left < table.CLOSE_FIT:
             return None
-        self.fits = [start]
-        for reading in (first, *readings(drives, self.model.units, self.are_counts)):
-            if reading.kind == 'drive_order' and self._top().left < table.CLOSE_FIT:
+        for reading in readings(drives, self.model.units, self.are_counts):
+            is_order = reading.kind == 'drive_order'
+            if not is_order and explains and start.most_left < table.EXPLAINED:
+                continue
+            if is_order and self._top().left < table.CLOSE_FIT:
                 break
             for unit in self.excerpts:
-                fit = None if reading is first and unit == 1 else self.fit(reading, unit)
+                fit = self.fit(reading, unit)
                 # Symmetric robots fit nearly as well in another order of their drives.
-                if fit is not None and (reading.kind != 'drive_order'
-                                        or fit.left < table.BETTER_ORDER * start.left):
+                if fit is not None and (
+                        not is_order or fit.left < table.BETTER_ORDER * start.left):
                     self.fits.append(fit)
-        for seed in (start, self._top()):
-            self.fits += self._turned(seed)
+        for unit in self.excerpts:
+            if unit != 1 and (fit := self.fit(first, unit)) is not None:
+                self.fits.append(fit)
+        if not (explains and start.most_left < table.EXPLAINED):
+            for seed in (start, self._top()):
+                self.fits += self._turned(seed)
         best = self._top()
         is_sure = not best.is_plain and best.left <= table.GOOD_FIT and self._is_certain(best)
         return best if is_sure else None
@@ -206,17 +226,27 @@ class Search:
         most = max(fit.score for fit in self.fits)
         return next(fit for fit in self.fits if fit.score > most - 0.5)
 
-    def rival(self, best: Fit) -> Fit | None:
-        """Return another reading of positions that is nearly as likely as the best one.
+    def rivals(self, best: Fit) -> list[Fit]:
+        """Return other readings that the recording cannot separate from the best one.
 
-        Inertia alone cannot separate positions in another unit from efforts in another.
+        Inertia alone cannot separate positions in another unit from efforts in another, and the
+        weight of a plane arm cannot separate a zero from the mounting of the base.
         """
-        others = [fit for fit in self.fits if fit.reading.kind == 'position_unit'
-                  and best.score - fit.score < table.SURE
-                  and fit.time_unit == best.time_unit == 1
-                  and best.reading.kind in ('', 'position_unit')
-                  and not np.allclose(fit.reading.position, best.reading.position)]
-        return max(others, key=lambda fit: fit.score, default=None)
+        found: dict[str, Fit] = {}
+        for fit in sorted(self.fits, key=lambda fit: -fit.score):
+            pair = {best.reading.kind, fit.reading.kind}
+            same_motion = pair <= {'position_offset', 'mounting'} and len(pair) > 1
+            other_unit = pair <= {'', 'position_unit'} and fit.reading.kind and not np.allclose(
+                fit.reading.scale, best.reading.scale)
+            if fit.time_unit == best.time_unit == 1 and (same_motion or other_unit) and (
+                    best.score - fit.score < table.SURE):
+                found.setdefault(fit.reading.kind, fit)
+        if best.what.startswith(table.EITHER):
+            evidence = self.evidence(best.reading, 1.0)
+            assert evidence is not None
+            factors = np.nan_to_num(self._factors(evidence, best.reading), nan=1.0)
+            found['drive_constant'] = replace(best, what='', scales=factors)
+        return [*found.values()]
 
     def _turned(self, seed: Fit) -> Iterator[Fit]:
         """Yield readings with zeros that are quarter turns off, one drive after another."""
@@ -226,84 +256,128 @@ class Search:
             fits = [fit for d, units in enumerate(self.model.units) if units.turns
                     for turn in table.QUARTERS
                     if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
-                                        seed.time_unit)) is not None]
+                                        seed.time_unit, seed.score)) is not None]
             best = max(fits, key=lambda fit: fit.score, default=seed)
             if best.score <= seed.score:
                 return
             seed = best
             yield seed
 
-    def fit(self, reading: Reading, unit: float, in_pieces: bool = False) -> Fit | None:
-        """Return a reading with its best scales of efforts; None where it cannot be."""
+    def fit(self, reading: Reading, unit: float, least: float = -np.inf) -> Fit | None:
+        """Return a reading with its best scales of efforts.
+
+        None where it cannot be, or its score cannot reach the best one or `least`.
+        """
         excerpt = self.excerpts.get(unit)
         if excerpt is None or (reading.kind and not self._possible(reading, excerpt)):
             return None
-        offset = np.asarray(reading.offset, float)
-        key = unit, reading.position.tobytes(), offset.tobytes()
-        if key not in self._parts:
-            self._parts[key] = parts_of(self.model, excerpt, reading, in_pieces)
-        parts = self._parts[key]
-        if parts is None:
+        evidence = self.evidence(reading, unit)
+        # A mounting without weight explains none.
+        if evidence is None or (reading.gravity is not None and not evidence.has_weight):
             return None
-        effort, weights = reading.effort_of(excerpt.effort), self._weights(excerpt, parts)
-        weights = np.abs(reading.effort) @ weights
-        found = {(d, scale): one for d in np.flatnonzero(weights > 0).tolist()
-                 for scale in table.SCALES if (one := likelihood(
-                     effort[:, d], parts, d, scale, self.masses)) is not None}
-        measured = sorted({d for d, _ in found})
+        weights = self._weights(excerpt, evidence)[reading.efforts]
+        measured = [d for d in np.flatnonzero(weights > 0).tolist()
+                    if evidence.is_measured(d, reading.efforts[d])]
         if not measured:
             return None
         cost = (reading.cost + (table.COST['time_unit'] if unit != 1 else 0.0)
                 + self._outside(reading, excerpt))
+        most = sum(weights[d] * evidence.most(d, reading.efforts[d]) for d in measured) - cost
+        if most < max([least, *(fit.score for fit in self.fits)]) - table.SURE:
+            return None
+        known: dict[tuple[int, float], Likelihood] = {}
 
-        def fit_of(scales: Array) -> Fit:
-            ones = [found[d, scales[d]] for d in measured]
+        def likelihood(d: int, scale: float) -> Likelihood:
+            if (d, scale) not in known:
+                known[d, scale] = evidence.likelihood(d, reading.efforts[d], scale, self.masses)
+            return known[d, scale]
+
+        def fit_of(scales: Array, price: float, what: str = '') -> Fit:
+            found = [likelihood(d, float(scales[d])) for d in measured]
             weight = weights[measured]
-            return Fit(reading, unit, float(
-                sum(w * one.score for w, one in zip(weight, ones, strict=True)))
-                - cost - self._cost(scales, measured), scales,
-                float(np.exp(np.average(np.log([one.left for one in ones]), weights=weight))))
+            score = float(sum(w * each.score for w, each in zip(weight, found, strict=True)))
+            return Fit(reading, unit, score - cost - price, scales, what, float(np.exp(np.average(
+                np.log([each.left for each in found]), weights=weight))),
+                max(each.left for each in found), max(each.prior for each in found))
 
-        alone = np.ones(effort.shape[1])
+        count = len(weights)
+        fits = [fit_of(np.ones(count), 0.0)]
+        if not reading.kind and fits[0].most_left < table.CLOSE_FIT and (
+                fits[0].prior < table.PLAUSIBLE):
+            return fits[0]
+        alone, has_weight = np.ones(count), evidence.has_weight
+        factors = self._factors(evidence, reading)
+
+        def distance(scale: float, group: Sequence[int]) -> float:
+            """Return by which logarithm factors of masses are off those of a unit."""
+            off = np.abs(np.log(np.abs(factors[group] / scale)))
+            return 0.0 if abs(scale) == 1 else float(np.max(
+                off, initial=0.0, where=np.isfinite(off))) if np.isfinite(off).any() else np.inf
+
+        units = table.SCALES if self.has_gain else (1.0, -1.0)
+        same = float(np.log(table.SAME_MASSES))
         for d in measured:
-            alone[d] = max(table.OF_ONE, key=lambda scale: found[d, scale].score
-                           - _mistakes(scale) / weights[d])
-        choices = [alone]
+            alone[d] = max((likelihood(d, scale).score - _mistakes(scale) / weights[d], scale)
+                           for scale in units if scale in table.OF_ONE
+                           and distance(scale, [d]) < same)[1]
+        fits.append(fit_of(alone, self._cost(alone, measured)))
         # Inertia alone may be invented: units that are no prefixes need a weight.
-        has_weight = bool(np.nanmax(np.abs(parts.gravity)) > 0)
-        for scale in table.SCALES if has_weight else table.OF_ONE:
-            common = np.ones(effort.shape[1])
-            common[np.isfinite(effort).any(axis=0)] = scale
-            choices.append(common)
-        own = np.ones(effort.shape[1])
-        for d in measured if has_weight else ():
-            factor = rigid_factor(effort[:, d], parts, d)
-            if factor and abs(np.log(abs(factor))) > np.log(table.SAME_MASSES) and (
-                    one := likelihood(effort[:, d], parts, d, factor, self.masses)) is not None:
-                own[d], found[d, factor] = factor, one
-        if np.all(own[measured] != 1) and np.ptp(np.sign(own[measured])) == 0:
-            choices.append(own)
-        return max((fit_of(scales) for scales in choices), key=lambda one: one.score)
+        for scale in (scale for scale in units if has_weight or scale in table.OF_ONE):
+            common = np.ones(count)
+            common[np.isfinite(excerpt.effort[:, reading.efforts]).any(axis=0)] = scale
+            is_prefix, off = abs(scale) != table.KGF_CM, distance(scale, measured)
+            if off < (same if is_prefix else table.NEAR_UNIT):
+                fits.append(fit_of(common, _mistakes(scale), '' if is_prefix or (
+                    off < table.AT_UNIT) else table.EITHER))
+        if has_weight and self.has_gain:
+            fits += [fit_of(scales, price, what) for scales, price, what in self._by_drive(
+                factors, measured)]
+        found = max(fits, key=lambda fit: fit.score)
+        # Another direction of weight is credible only for efforts that show the weight.
+        concerned = [likelihood(d, float(found.scales[d])).prior for d in measured
+                     if d in reading.drives]
+        is_turned = reading.kind in ('position_offset', 'mounting')
+        return None if is_turned and min(concerned, default=0.0) > table.PLAUSIBLE else found
+
+    def _factors(self, evidence: Evidence, reading: Reading) -> Array:
+        """Return the factor of weight and inertia in the efforts of each drive, (D,), or NaN."""
+        return np.array([evidence.factor(d, column) if evidence.is_measured(d, column) else np.nan
+                         for d, column in enumerate(reading.efforts.tolist())])
+
+    def _by_drive(self, factors: Array, measured: Sequence[int],
+                  ) -> Iterator[tuple[Array, float, str]]:
+        """Yield scales that differ from drive to drive, their prior cost and what they are."""
+        measured = [d for d in measured if np.isfinite(factors[d])]
+        signs = np.sign(factors[measured])
+        if not measured or np.ptp(signs) > 0:
+            return
+        price = table.COST['effort_sign'] if signs[0] < 0 else 0.0
+        limits = self.model.limits.efforts
+        if len(measured) > 1 and np.all(np.isfinite(limits[measured])):
+            for share, name in table.SHARES.items():
+                yield signs[0] / (share * limits), price + table.COST['effort_unit'] + 1.0, name
+        sizes = np.abs(factors[measured])
+        # A load may multiply what one drive of several needs.
+        if len(measured) >= min(2, len(factors)) and np.all(
+                np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
+                sizes > table.LARGEST_COMPLIANCE):
+            yield (np.where(np.isin(np.arange(len(factors)), measured), factors, 1.0),
+                   price + table.COST['drive_constant'], '')
 
     def _cost(self, scales: Array, measured: list[int]) -> float:
         """Return the prior cost of scales: kinds of drives may share a mistake."""
-        told = scales[measured]
-        if not np.all(np.isin(told, table.SCALES)):
-            return table.COST['drive_constant'] + (
-                table.COST['effort_sign'] if told[0] < 0 else 0.0)
-        if np.all(told == told[0]):
-            return _mistakes(float(told[0]))
+        if np.ptp(scales[measured]) == 0:
+            return _mistakes(float(scales[measured[0]]))
         kinds = [scales[[*family]] for family in table.families(self.model.drives)]
         return sum(_mistakes(float(kind[0])) if np.all(kind == kind[0])
                    else sum(map(_mistakes, kind.tolist())) for kind in kinds)
 
-    def _weights(self, excerpt: Excerpt, parts: Parts) -> Array:
+    def _weights(self, excerpt: Excerpt, evidence: Evidence) -> Array:
         """Return what each drive counts, (D,): the strongest 1, one at rest among others 0."""
         effort = np.sqrt(np.nanmean(np.nan_to_num(excerpt.effort) ** 2, axis=0))
-        speed = np.sqrt(np.mean(parts.velocity ** 2, axis=0))
-        moves = speed > self.model.reversal.velocity
-        force = np.sqrt(np.nanmean((parts.inertia + parts.gravity + parts.others) ** 2, axis=0))
-        sizes = np.maximum(effort / max(effort.max(), 1e-300), force / max(force.max(), 1e-300))
+        moves = evidence.speed > self.model.reversal.velocity
+        sizes = np.maximum(effort / max(effort.max(), 1e-300),
+                           evidence.size / max(evidence.size.max(), 1e-300))
         found = np.where((sizes > table.WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
         weights: Array = found * (moves if np.any(moves & (found > 0)) else 1.0)
         return weights
@@ -313,19 +387,15 @@ class Search:
 
         Weight and inertia of a wrong model may be negative, friction may not.
         """
-        if not np.any(fit.scales < 0):
-            return True
-        excerpt = self.excerpts[fit.time_unit]
-        parts = parts_of(self.model, excerpt, fit.reading, in_pieces=False)
-        if parts is None:
-            return False
-        effort, votes = fit.reading.effort_of(excerpt.effort), 0.0
+        evidence = self.evidence(fit.reading, fit.time_unit)
+        if evidence is None or not np.any(fit.scales < 0):
+            return evidence is not None
+        weights, votes = self._weights(self.excerpts[fit.time_unit], evidence), 0.0
         width = np.broadcast_to(self.model.reversal.velocity, fit.scales.shape)
-        weights = self._weights(excerpt, parts)
-        for d in np.flatnonzero(fit.scales < 0).tolist():
-            known = np.isfinite(effort[:, d])
-            if np.ptp(effort[known, d]) > 0 and root_mean_square(parts.velocity[:, d]) > width[d]:
-                some = Shares.of(effort[known, d], parts.rows(known), d)
+        for d in np.flatnonzero((fit.scales < 0) & (evidence.speed > width)).tolist():
+            column = int(fit.reading.efforts[d])
+            if evidence.is_measured(d, column):
+                some = Shares.of(evidence, d, column)
                 if abs(some.friction) > table.CERTAIN * some.friction_by_chance:
                     votes += float(weights[d] * np.sign(some.friction))
         return votes <= 0
@@ -335,7 +405,7 @@ class Search:
         lower, upper = self.strokes
         with np.errstate(invalid='ignore'):
             slack = table.STROKE_SLACK * (upper - lower)
-        position = excerpt.motion.position @ reading.position.T + reading.offset
+        position = read_motion(excerpt.motion, reading).position
         slack = np.where(np.isfinite(slack), slack, 0.0)
         return not np.any((position < lower - slack) | (position > upper + slack))
 
@@ -370,38 +440,97 @@ def _time_units(recording: Recording) -> list[float]:
 
 def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
-    drives = model.drives
+    drives, reading = model.drives, fit.reading
     if fit.time_unit != 1.0:
         yield OtherReading('time_unit', 1, f'the times look like {table.TIMES[fit.time_unit]}: as '
                            f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
                            'for its efforts', scales=(('', 'time_scale', fit.time_unit),))
-    if fit.reading.kind == 'drive_order':
-        scales, line = _order_scales(model, recording, fit.reading)
-        yield OtherReading.of('drive_order', drives, fit.reading.drives, fit.reading.what, line,
+    if reading.kind == 'drive_order':
+        scales, line = _order_scales(model, recording, reading)
+        yield OtherReading.of('drive_order', drives, reading.drives, reading.what, line,
                               scales=scales)
-    elif fit.reading.kind:
-        yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
-                              scales=position_scales(model, fit.reading))
-    if fit.has_constants:
-        yield constants_reading(model, dict(enumerate(fit.scales.tolist())))
-        return
-    for scale in dict.fromkeys(fit.scales[fit.scales != 1].tolist()):
-        yield unit_reading(model, np.flatnonzero(fit.scales == scale).tolist(), scale)
+    elif reading.gravity is not None:
+        vector = ', '.join(f'{value:g}' for value in mounted_gravity(model, reading.gravity))
+        key = 'under robot' if 'robot.gravity' in model.values else 'in the model file'
+        yield OtherReading.of('mounting', drives, reading.drives, reading.what,
+                              f'gravity: [{vector}] {key}')
+    elif reading.kind:
+        yield OtherReading.of(reading.kind, drives, reading.drives, reading.what,
+                              scales=_position_scales(model, reading))
+    if fit.what in table.SHARES.values():
+        yield OtherReading.of(
+            'effort_unit', drives, range(len(drives)), f'the effort of '
+            f"{named(drives, tuple(range(len(drives))))} looks like {fit.what} of the drives' "
+            'largest', scales=_effort_scales(model, range(len(drives)), fit.scales))
+    elif not np.all(np.isin(fit.scales, table.SCALES)):
+        yield _constants(model, fit.scales)
+    else:
+        for scale in dict.fromkeys(fit.scales[fit.scales != 1].tolist()):
+            yield _unit(model, np.flatnonzero(fit.scales == scale).tolist(), fit.scales)
 
 
-def position_scales(model: DriveModel, reading: Reading) -> Scales:
+def _constants(model: DriveModel, factors: Array) -> OtherReading:
+    """Return the finding that efforts are multiples of the model's, by drive: currents."""
+    every = tuple(range(len(model.drives)))
+    listed = ', '.join(f'{factor:.3g} ({drive})' for drive, factor in zip(
+        model.drives, factors, strict=True) if factor != 1)
+    gains = ', '.join('1.0' if factor == 1 else f'{1 / factor:.3g}' for factor in factors)
+    return OtherReading.of(
+        'drive_constant', model.drives, every, f'the effort of {named(model.drives, every)} is '
+        f'another multiple of what the masses need: {listed}: it looks like currents in amperes, '
+        'or another unit', f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
+
+
+def _unit(model: DriveModel, group: Sequence[int], scales: Array) -> OtherReading:
+    """Return the finding that efforts of some drives are the model's in another unit or sign."""
+    drives, scale = model.drives, float(scales[group[0]])
+    times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
+    what = f'the effort of {named(drives, tuple(group))} looks like {times} what the model says'
+    if abs(scale) != 1:
+        units = dict.fromkeys(table.EFFORTS[abs(scale)].format(model.units[k].effort)
+                              for k in group)
+        what += f', as if it were in {" or ".join(units)}'
+    if scale < 0 and len(group) == len(drives):
+        what += f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
+    return OtherReading.of('effort_sign' if abs(scale) == 1 else 'effort_unit', drives, group,
+                           what, scales=_effort_scales(model, group, scales))
+
+
+def _effort_scales(model: DriveModel, group: Sequence[int], scales: Array) -> Scales:
+    """Return the factors below `columns` by which efforts are divided by others, (D,)."""
+    before = model.recorded.columns
+    return tuple((model.drives[k], 'effort_scale', (
+        1.0 if before is None else before.drives[model.drives[k]].effort_scale)
+        / float(scales[k])) for k in group)
+
+
+def mounted_gravity(model: DriveModel, direction: Array) -> Array:
+    """Return gravity as large as a model's in another direction of the base [m/s^2]."""
+    given = model.values.get('robot.gravity', model.values.get('gravity'))
+    return np.linalg.norm(given) * direction + 0.0
+
+
+def mounted(model: DriveModel, direction: Array | None) -> DriveModel:
+    """Return a model under gravity in another direction of the base; the model for None."""
+    if direction is None:
+        return model
+    key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
+    return DriveModel.from_parameters(
+        {**model.values, key: tuple(mounted_gravity(model, direction).tolist())}, model.source)
+
+
+def _position_scales(model: DriveModel, reading: Reading) -> Scales:
     """Return the factors and offsets below `columns` with which positions are read so."""
     found = []
-    offset = np.zeros(len(model.drives)) + reading.offset
     for k, drive in enumerate(model.drives):
         columns = model.recorded.columns
         before = None if columns is None else columns.drives[drive]
         scale, start = (1.0, 0.0) if before is None else (
             before.position_scale, before.position_offset)
-        factor = float(reading.position[k, k])
-        if k in reading.drives and factor not in (0.0, 1.0):
+        factor = float(reading.scale[k])
+        if k in reading.drives and factor != 1:
             found.append((drive, 'position_scale', factor * scale))
-        if k in reading.drives and (total := factor * start + float(offset[k])) != start:
+        if k in reading.drives and (total := factor * start + float(reading.offset[k])) != start:
             found.append((drive, 'position_offset', total))
     return tuple(found)
 
@@ -409,9 +538,9 @@ def position_scales(model: DriveModel, reading: Reading) -> Scales:
 def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> tuple[Scales, str]:
     """Return the columns with which drives are read in another order, or a line of joints."""
     drives, joints = model.drives, model.recorded.joints or model.drives
-    moved = [(keys, matrix.argmax(axis=1)) for keys, matrix in (
-        (('position', 'velocity'), reading.position), (('effort', 'current'), reading.effort))
-        if np.any(matrix != np.eye(len(drives)))]
+    moved = [(keys, places) for keys, places in (
+        (('position', 'velocity'), reading.positions), (('effort', 'current'), reading.efforts))
+        if np.any(places != np.arange(len(drives)))]
     columns = {} if model.recorded.columns is None else model.recorded.columns.drives
     names = {drive: columns[drive].names for drive in columns}
     if not any(names.values()):
@@ -444,13 +573,13 @@ def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, A
         unit = next((unit for unit in names if unit < 1 and np.all(
             reach[list(group)] * unit <= ends[list(group)])), 1.0)
         farthest = max(far, key=lambda k: reach[k] / ends[k])
-        scale = Reading('position_unit', '', group, np.diag(
-            [unit if k in group else 1.0 for k in range(len(drives))]), np.eye(len(drives)), 0.0)
+        scale = plain(len(drives)).changed('position_unit', '', group, 0.0, scale=np.array(
+            [unit if k in group else 1.0 for k in range(len(drives))]))
         yield OtherReading.of(
             'position_unit', drives, group, f'the positions of {named(drives, group)} reach '
             f'{reach[farthest]:.4g} {model.units[farthest].position}, far out of the stroke'
             + (f', as if they were in {names[unit]}' if unit != 1.0 else ''),
-            scales=() if unit == 1.0 else position_scales(model, scale))
+            scales=() if unit == 1.0 else _position_scales(model, scale))
 
 
 def _factors(excerpt: Excerpt | None) -> dict[int, float]:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the efforts of a recording are: their unit, their sign, and whether they are measured.
+"""Whether the efforts of a recording are measured, and recorded with their sign.
 
 What a drive applies accelerates bodies, carries their weight and overcomes friction, and what
 measures it adds noise. A command, an error of position, an external torque or an effort without
@@ -11,16 +11,14 @@ gravity lacks some of these, and any missing effect that is found in it is wrong
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.readings import table
-from pprs_dynamics.inference.readings.evidence import Shares, effort_contents
-from pprs_dynamics.inference.readings.findings import NoMeasurement, OtherReading, columns_line
+from pprs_dynamics.inference.readings.evidence import Evidence, Shares, effort_contents
+from pprs_dynamics.inference.readings.findings import NoMeasurement, OtherReading
 from pprs_dynamics.inference.readings.table import named
-from pprs_dynamics.inference.residuals.excerpt import Excerpt, forces_on
+from pprs_dynamics.inference.residuals.excerpt import Excerpt
 from pprs_dynamics.measurement.files.recording import Recording, signed
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model import recorded_names
@@ -29,97 +27,6 @@ from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 
 KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
          recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
-
-# -------------------------------------------------------------------------------------- units
-
-
-def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[OtherReading]:
-    """Return the unit of the efforts, by the factors of inertia and gravity over the model's."""
-    factors = {k: contents[drive].scale for k, drive in enumerate(model.drives)
-               if drive in contents}
-    certain = {k: scale for k, (scale, doubt) in factors.items()
-               if abs(scale) > table.CERTAIN * doubt}
-    known = [contents[model.drives[k]] for k in certain]
-    every = tuple(range(len(model.drives)))
-    scales = np.array([*certain.values()])
-    if not certain or np.ptp(np.sign(scales)) > 0 or (scales[0] < 0 and any(
-            one.friction > table.CERTAIN * one.friction_by_chance for one in known)):
-        return []
-    # Masses of a description are right within a factor; inertia alone may be invented.
-    has_weight = any(abs(one.gravity) > table.CERTAIN * one.gravity_doubt for one in known)
-    sizes, sign = np.abs(scales), float(np.sign(scales[0]))
-    for unit in table.EFFORTS:
-        is_prefix = unit in table.PREFIXES
-        tolerance = np.log(table.SAME_MASSES) if is_prefix and has_weight else table.NEAR_UNIT
-        off = np.abs(np.log(sizes / unit))
-        if np.all(off < tolerance) and (has_weight or is_prefix):
-            found = unit_reading(model, every, sign * unit)
-            if is_prefix or np.all(off < table.AT_UNIT):
-                return [found]
-            line = columns_line([found], model.recorded.columns is not None)
-            return [OtherReading.of(
-                'ambiguous', model.drives, every, f'{found.what}, or in amperes: the factors are '
-                + ', '.join(f'{scale:.3g}' for scale in scales),
-                f'{line} or {constants_reading(model, certain).line}')]
-    limits = model.limits.efforts[[*certain]]
-    if len(certain) > 1 and has_weight and np.all(np.isfinite(limits)):
-        gains = np.log(sizes * limits)
-        are_one = (np.std(np.log(sizes)) > table.SEVERAL_FACTORS
-                   and np.std(gains) < table.ONE_FACTOR)
-        for share, name in table.SHARES.items():
-            if are_one:
-                size = np.exp(gains.mean()) * share
-                is_share = 1 - table.NEAR_ONE <= size <= table.LARGEST_OVERLOAD
-            else:  # of two drives the factors may be near, and yet just these
-                is_share = bool(np.all(np.abs(sizes * limits * share - 1) < table.NEAR_ONE / 2)
-                                and np.any(np.abs(np.log(sizes)) > table.SEVERAL_FACTORS))
-            if is_share:
-                return [OtherReading.of(
-                    'effort_unit', model.drives, every, 'the effort of '
-                    f"{named(model.drives, every)} looks like {name} of the drives' largest",
-                    scales=effort_scales(model, every, sign * share * model.limits.efforts))]
-    # A load may multiply what one drive of several needs.
-    if has_weight and len(certain) >= min(2, len(every)) and np.all(
-            np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
-            sizes > table.LARGEST_COMPLIANCE):
-        return [constants_reading(model, certain)]
-    return []
-
-
-def constants_reading(model: DriveModel, factors: Mapping[int, float]) -> OtherReading:
-    """Return the finding that efforts are multiples of the model's, by drive: currents."""
-    every = tuple(range(len(model.drives)))
-    listed = ', '.join(f'{factor:.3g} ({model.drives[k]})' for k, factor in factors.items())
-    gains = ', '.join('1.0' if factors.get(k, 1.0) == 1 else f'{1 / factors[k]:.3g}' for k in every)
-    return OtherReading.of(
-        'drive_constant', model.drives, every, f'the effort of {named(model.drives, every)} is '
-        f'another multiple of what the masses need: {listed}: it looks like currents in amperes, '
-        'or another unit', f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
-
-
-def unit_reading(model: DriveModel, group: Sequence[int], scale: float) -> OtherReading:
-    """Return the finding that efforts of some drives are the model's in another unit or sign."""
-    drives, kind = model.drives, 'effort_sign' if abs(scale) == 1 else 'effort_unit'
-    times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
-    what = f'the effort of {named(drives, tuple(group))} looks like {times} what the model says'
-    if abs(scale) != 1:
-        units = dict.fromkeys(table.EFFORTS[abs(scale)].format(model.units[k].effort)
-                              for k in group)
-        what += f', as if it were in {" or ".join(units)}'
-    if scale < 0 and len(group) == len(drives):
-        what += f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
-    return OtherReading.of(kind, drives, group, what, scales=effort_scales(
-        model, group, np.full(len(drives), 1 / scale)))
-
-
-def effort_scales(model: DriveModel, group: Sequence[int], factors: Array,
-                  ) -> tuple[tuple[str, str, float], ...]:
-    """Return the factors below `columns` with which efforts are multiplied by others, (D,)."""
-    before = model.recorded.columns
-    return tuple((drive, 'effort_scale', float(factors[k]) * (
-        1.0 if before is None else before.drives[drive].effort_scale))
-        for k, drive in enumerate(model.drives) if k in group)
-
 
 def find_sign_bit(recording: Recording) -> Iterator[Defect]:
     """Yield efforts that are magnitudes with a bit for their sign, as servos report loads."""
@@ -142,80 +49,30 @@ def find_sign_bit(recording: Recording) -> Iterator[Defect]:
             scales=tuple((recording.drives[d], 'effort_sign_bit', float(bit)) for d in group))
 
 
-# ------------------------------------------------------------- signs and units in one part
-
-
-def find_changed_efforts(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
-                         ) -> Iterator[OtherReading]:
-    """Yield efforts without their sign, and units or signs that are others from a time on."""
-    forces = None if excerpt is None else forces_on(model, excerpt.motion, excerpt.time)
-    if excerpt is None or forces is None:
-        return
-    size = np.sqrt(np.mean(forces ** 2, axis=0))
-    told = tuple(d for d in range(len(size)) if size[d] > table.WEAK * size.max()
-                 and np.isfinite(excerpt.effort[:, d]).sum() > 2 / table.LEAST_PART)
-    effort, force = excerpt.effort / size, forces / size
-    unsigned = tuple(d for d in told if _is_unsigned(
-        recording.effort[:, d], effort[:, d], force[:, d]))
+def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evidence: Evidence,
+                  ) -> Iterator[OtherReading]:
+    """Yield efforts that are recorded without their sign."""
+    force = evidence.force
+    size, strongest = evidence.size, evidence.size.max()
+    followed = np.isfinite(force).all(axis=1)
+    unsigned = []
+    for d in np.flatnonzero(size > table.WEAK * strongest).tolist():
+        known = recording.effort[np.isfinite(recording.effort[:, d]), d]
+        rows = followed & np.isfinite(excerpt.effort[:, d])
+        if not len(known) or np.any(known < 0) or not np.any(known) or not np.any(rows):
+            continue
+        effort, model_force = excerpt.effort[rows, d], force[rows, d]
+        below = float(np.sum(np.minimum(model_force, 0.0) ** 2) / np.sum(model_force ** 2))
+        signed_misfit, misfit = (float(np.sum((effort - each) ** 2)) for each in (
+            model_force, np.abs(model_force)))
+        if table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and (
+                table.CLEARLY * misfit < signed_misfit):
+            unsigned.append(d)
     if unsigned:
         yield OtherReading.of(
             'effort_absolute', model.drives, unsigned,
-            f'the effort of {named(model.drives, unsigned)} looks like its absolute value: it is '
-            'never below 0, where the model changes sign; it must be recorded with its sign')
-        return
-    for group in dict.fromkeys((told, *((d,) for d in told))) if told else ():
-        change = _change(effort[:, group], force[:, group])
-        if change is not None:
-            factor, at, is_after = change
-            every = tuple(range(len(model.drives))) if group == told else group
-            unit = table.CHANGES[factor].format(model.units[group[0]].effort)
-            yield OtherReading.of(
-                'effort_unit' if factor > 0 else 'effort_sign', model.drives, every,
-                f'the effort of {named(model.drives, every)} looks {unit} '
-                f'{"from" if is_after else "until"} about {excerpt.time[at]:.3g} s'
-                f'{" on" if is_after else ""}, unlike in the rest; the parts must be recordings '
-                'of their own')
-            return
-
-
-def _unlike(effort: Array, force: Array) -> Array:
-    """Return by how much efforts and forces, (N, d), differ and how large they are, (2, N)."""
-    found: Array = np.nansum([(effort - force) ** 2, effort ** 2 + force ** 2], axis=2)
-    return found
-
-
-def _share(sums: Array) -> Any:
-    """Return how much of the size the differences are: 0 for equal, 1 for unrelated."""
-    return sums[0] / np.maximum(sums[1], 1e-300)
-
-
-def _is_unsigned(recorded: Array, effort: Array, force: Array) -> bool:
-    below = np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2)
-    known = recorded[np.isfinite(recorded)]
-    signed, without = (_share(_unlike(effort[:, None], each[:, None]).sum(axis=1))
-                       for each in (force, np.abs(force)))
-    return bool(table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and np.all(known >= 0)
-                and np.any(known) and table.CLEARLY * without < signed)
-
-
-def _change(effort: Array, force: Array) -> tuple[float, int, bool] | None:
-    """Return by which factor efforts (N, d) change, at which sample, and in which part."""
-    margin = max(1, int(table.LEAST_PART * len(effort)))
-    as_said, found = _unlike(effort, force), []
-    for factor in table.CHANGES:
-        changed = _unlike(effort / factor, force)
-        least = min(_share(as_said.sum(axis=1)), _share(changed.sum(axis=1))) / table.CLEARLY
-        for is_after in (True, False):
-            before, after = (as_said, changed) if is_after else (changed, as_said)
-            sums = (np.cumsum(before, axis=1)[:, :-1]
-                    + np.cumsum(after[:, ::-1], axis=1)[:, -2::-1])
-            at = margin + int(np.argmin(_share(sums)[margin:-margin]))
-            part = changed[:, at + 1:] if is_after else changed[:, :at + 1]
-            # What changed must itself be as the model has it.
-            if max(_share(part.sum(axis=1)), _share(sums[:, at])) < table.GOOD_FIT and (
-                    _share(sums[:, at]) < least):
-                found.append((float(_share(sums[:, at])), factor, at + is_after, is_after))
-    return min(found)[1:] if found else None
+            f'the effort of {named(model.drives, tuple(unsigned))} looks like its absolute value: '
+            'it is never below 0, where the model changes sign; it must be recorded with its sign')
 
 
 # ------------------------------------------------------------------------------- measurements

@@ -11,10 +11,9 @@ from math import comb
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import Reading, plain
@@ -29,61 +28,187 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY
 
 CONDITION = 1e-6  # of a column beside others: less is rounding
+# Columns of the regression of one drive; the effort is the last one.
+INERTIA, GRAVITY, OTHERS, VELOCITY, DIRECTION, CONSTANT, EFFORT = range(7)
 
 
-@dataclass(frozen=True)
-class Parts:
-    """A model's forces on an excerpt, (N, D) each; NaN where the mechanism cannot follow."""
+class Likelihood(NamedTuple):
+    """Score of efforts under a model [nats], prior cost in it, and their residual.
 
-    inertia: Array
-    gravity: Array
-    others: Array
-    velocity: Array
-    direction: Array
+    The residual is the square of that over the effort.
+    """
 
-    def rows(self, which: NDArray[np.bool_]) -> Parts:
-        """Return some of the samples."""
-        return Parts(*(part[which] for part in (
-            self.inertia, self.gravity, self.others, self.velocity, self.direction)))
+    score: float
+    prior: float
+    left: float
 
 
-def parts_of(model: DriveModel, excerpt: Excerpt, reading: Reading, in_pieces: bool = False,
-             ) -> Parts | None:
-    """Return a model's forces on an excerpt in a reading; None where it cannot follow at all."""
-    motion = read_motion(excerpt.motion, reading)
-    position = motion.position
-    moved = replace(motion, position=position - model.position_error(position))
-    count = len(position)
-    rows = [slice(k, min(k + PIECE, count)) for part in motion.segments
-            for k in range(part.start, part.stop, PIECE)] if in_pieces else [slice(0, count)]
-    found = np.full((3, count, position.shape[1]), np.nan)
-    for part in rows:
-        try:
-            found[:, part] = _forces(model, _taken(moved, part), excerpt.time[part])
-        except (PprsError, np.linalg.LinAlgError):
-            if not in_pieces:
-                return None
-    if not np.isfinite(found).any():
-        return None
-    # A drive that is always slow turns over within its own speeds.
-    width = np.minimum(model.reversal.velocity, table.REVERSAL * np.sqrt(
-        np.mean(motion.velocity ** 2, axis=0)) + 1e-300)
-    return Parts(found[0], found[1], found[2], motion.velocity, smooth_sign(motion.velocity, width))
+@dataclass
+class Evidence:
+    """Regression of the efforts of an excerpt on a model's forces, for D drives and columns.
+
+    Parameters
+    ----------
+    roots : (D, D, 7, 7) array
+        By drive and column of efforts: triangle of the QR decomposition of inertia, gravity, other
+        forces, velocity, its direction, 1 and the effort.
+    count, total, swing : (D, D) arrays
+        Samples, sum of the squared efforts, and of their differences from the mean.
+    size, speed : (D,) arrays
+        Root mean squares of the model's forces, and of velocities.
+    force : (N, D) array
+        Of the model; NaN where the mechanism cannot follow.
+    """
+
+    roots: Array
+    count: Array
+    total: Array
+    swing: Array
+    size: Array
+    speed: Array
+    force: Array
+
+    @classmethod
+    def of(cls, model: DriveModel, excerpt: Excerpt, reading: Reading, in_pieces: bool = False,
+           ) -> Evidence | None:
+        """Return the evidence of a reading of an excerpt; None where no motion can be followed.
+
+        With `in_pieces` a motion may be followed in parts alone.
+        """
+        motion = read_motion(excerpt.motion, reading)
+        position = motion.position
+        moved = replace(motion, position=position - model.position_error(position))
+        count = len(position)
+        forces = np.full((3, *position.shape), np.nan)
+        rows = [slice(0, count)] + [slice(first, min(first + PIECE, count)) for first in range(
+            0, count, PIECE)] * in_pieces
+        for part in rows:
+            try:
+                forces[:, part] = _forces(model, _taken(moved, part), excerpt.time[part])
+            except (PprsError, np.linalg.LinAlgError):
+                if not in_pieces:
+                    return None
+            else:
+                if part == rows[0]:
+                    break
+        followed = np.asarray(np.isfinite(forces).all(axis=0))
+        if not np.any(followed):
+            return None
+        # A drive that is always slow turns over within its own speeds.
+        speed = np.sqrt(np.mean(motion.velocity ** 2, axis=0))
+        width = np.minimum(model.reversal.velocity, table.REVERSAL * speed + 1e-300)
+        columns = np.stack([*forces, motion.velocity, smooth_sign(motion.velocity, width),
+                            np.ones_like(position)], axis=2)
+        columns = np.where(followed[:, :, None], columns, 0.0)
+        known = np.isfinite(excerpt.effort)
+        effort = np.where(known, excerpt.effort, 0.0)
+        gram = np.zeros((position.shape[1], position.shape[1], 7, 7))
+        gram[..., :6, :6] = np.einsum('ndij,ne->deij', columns[:, :, :, None]
+                                      * columns[:, :, None, :], known, optimize=True)
+        gram[..., 6, :6] = gram[..., :6, 6] = np.einsum('ndi,ne->dei', columns, effort)
+        gram[..., 6, 6] = np.einsum('nd,ne->de', followed.astype(float), effort ** 2)
+        sizes = np.sqrt(np.diagonal(gram, axis1=2, axis2=3))
+        used = np.where(sizes > 0, sizes, 1.0)
+        unit = gram / (used[..., :, None] * used[..., None, :])
+        unit[..., range(7), range(7)] = 1.0 + CONDITION ** 2
+        roots = np.swapaxes(np.linalg.cholesky(unit), 2, 3) * sizes[..., None, :]
+        samples, squares = gram[..., CONSTANT, CONSTANT], gram[..., EFFORT, EFFORT]
+        swing = squares - gram[..., CONSTANT, EFFORT] ** 2 / np.maximum(samples, 1)
+        force = forces.sum(axis=0)
+        return cls(roots, samples, squares, np.maximum(swing, 0.0) + table.WEAK ** 2 * squares,
+                   np.sqrt(np.nanmean(force ** 2, axis=0)), speed, force)
+
+    @property
+    def has_weight(self) -> bool:
+        """Whether the model has any."""
+        size = np.linalg.norm(self.roots[..., GRAVITY], axis=-1)
+        rest = np.linalg.norm(self.roots[..., INERTIA], axis=-1)
+        return bool(np.any(size > table.WEAK * rest))
+
+    def most(self, drive: int, column: int) -> float:
+        """Return a score that no likelihood of efforts of a drive exceeds, whatever their unit."""
+        left = max(self.roots[drive, column, -1, -1] ** 2, table.CLOSEST * self.swing[
+            drive, column])
+        return -0.5 * table.SAMPLES * float(np.log(left / self.swing[drive, column]))
+
+    def is_measured(self, drive: int, column: int) -> bool:
+        """Whether there are enough efforts for a regression."""
+        return bool(self.count[drive, column] > EFFORT and self.total[drive, column] > 0)
+
+    def likelihood(self, drive: int, column: int, scale: float, masses: float) -> Likelihood:
+        """Return how likely efforts are `scale` times those of a drive.
+
+        Inertia and gravity are the model's within a relative tolerance of its masses, friction
+        opposes the motion with any size, and a constant is small in comparison.
+        """
+        root = self.roots[drive, column]
+        count, total, swing = (float(each[drive, column]) / (1.0 if k == 0 else scale ** 2)
+                               for k, each in enumerate((self.count, self.total, self.swing)))
+        matrix = np.column_stack([root[:, :EFFORT], -root[:, CONSTANT]])
+        target = root[:, EFFORT] / scale
+        # Coefficients in units of the model's forces: mean and standard deviation of each.
+        mean = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        constant = table.CONSTANT * np.sqrt(total / count)
+        width = np.array([masses, masses, np.inf, np.inf, np.inf, constant, constant])
+        variance = total / count
+        for _ in range(3):
+            weight = np.sqrt(variance * count / table.SAMPLES) / width
+            found, _ = nnls(np.vstack([matrix, np.diag(weight)]),
+                            np.concatenate([target, weight * mean]))
+            rest = target - matrix @ found
+            variance = max(float(rest @ rest), table.CLOSEST * swing) / count
+        misfit = 0.5 * ((found - mean) / width) ** 2
+        # Masses are off by factors.
+        misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
+        rigid = matrix[:, :2]
+        moves = np.linalg.norm(rigid, axis=0) > table.WEAK * np.linalg.norm(rigid)
+        if abs(scale) != 1 and np.all(misfit[:2][moves] > table.MASSES_MOST):
+            # Neither weight nor inertia has this unit.
+            return Likelihood(-table.MASSES_MOST, table.MASSES_MOST, 1.0)
+        cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves])
+                     + np.sum(misfit[2:]))
+        # Friction beyond some times the rigid body's forces is unlikely.
+        friction, weight_of = (np.linalg.norm(each) + 1e-300 for each in (
+            matrix[:, OTHERS:CONSTANT] @ found[OTHERS:CONSTANT], rigid.sum(axis=1)))
+        excess = float(np.log(friction / weight_of / table.FRICTION))
+        cost += min(0.5 * max(excess, 0.0) ** 2, table.FRICTION_MOST)
+        score = -0.5 * table.SAMPLES * float(np.log(variance * count / swing)) - cost
+        # A residual that is larger than the effort is no worse than one that is as large.
+        return Likelihood(max(score, -table.MASSES_MOST), cost,
+                          variance * count / float(np.sqrt(swing * total)))
+
+    def factor(self, drive: int, column: int) -> float:
+        """Return the factor of inertia and gravity in efforts; NaN where it is not certain."""
+        root = self.roots[drive, column]
+        rigid = root[:, INERTIA] + root[:, GRAVITY]
+        columns = [rigid, root[:, VELOCITY], root[:, DIRECTION]]
+        if not _is_steady(root, rigid):
+            columns.append(root[:, CONSTANT])
+        factors, doubts, _ = fitted(root[:, EFFORT], columns)
+        return factors[0] if abs(factors[0]) > table.CERTAIN * doubts[0] else float('nan')
+
+
+def _is_steady(root: Array, force: Array) -> bool:
+    """Return whether a force of the regression hardly changes: it is a constant."""
+    ones = root[:, CONSTANT]
+    size, mean = float(force @ force), float(force @ ones) / max(float(ones @ ones), 1e-300)
+    return size - mean ** 2 * float(ones @ ones) < table.STEADY ** 2 * size
 
 
 def read_motion(motion: DriveMotion, reading: Reading) -> DriveMotion:
     """Return a recorded motion in a reading."""
-    return replace(motion, position=motion.position @ reading.position.T + reading.offset,
-                   velocity=motion.velocity @ reading.position.T,
-                   acceleration=motion.acceleration @ reading.position.T)
+    position, velocity, acceleration = (values[:, reading.positions] * reading.scale for values in (
+        motion.position, motion.velocity, motion.acceleration))
+    return replace(motion, position=position + reading.offset, velocity=velocity,
+                   acceleration=acceleration)
 
 
 def _taken(motion: DriveMotion, part: slice) -> DriveMotion:
-    segments = motion.segments if part.stop - part.start == len(motion.position) else (
-        slice(0, part.stop - part.start),)
+    if part.stop - part.start == len(motion.position):
+        return motion
     return replace(motion, position=motion.position[part], velocity=motion.velocity[part],
                    acceleration=motion.acceleration[part], index=motion.index[part],
-                   segments=segments)
+                   segments=(slice(0, part.stop - part.start),))
 
 
 def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
@@ -101,62 +226,6 @@ def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
             if not len(rigid) > 1:
                 others = forces.total - rigid[0]
     return np.stack([rigid[0] - rigid[1], rigid[1], others])
-
-
-class Likelihood(NamedTuple):
-    """Score of efforts under a model [nats], and their residual over the effort, squared."""
-
-    score: float
-    left: float
-
-
-def likelihood(effort: Array, parts: Parts, drive: int, scale: float, masses: float,
-               ) -> Likelihood | None:
-    """Return how likely efforts, (N,), are `scale` times those of a drive; None where all is 0.
-
-    Inertia and gravity are the model's within a relative tolerance of its masses, friction
-    opposes the motion with any size, and a constant is small in comparison.
-    """
-    columns = [part[:, drive] for part in (parts.inertia, parts.gravity, parts.others,
-                                           parts.velocity, parts.direction)]
-    known = np.isfinite(effort) & np.isfinite(columns[0])
-    total = float(np.sum(effort[known] ** 2))
-    swing = float(np.var(effort[known])) * int(known.sum()) + table.WEAK ** 2 * total
-    count = int(known.sum())
-    if count < len(columns) + 2 or not total > 0:
-        return None
-    inertia, gravity, *resisting = (column[known] for column in columns)
-    ones = np.full(count, root_mean_square(effort[known]) / abs(scale))
-    matrix = np.column_stack([inertia, gravity, *resisting, ones, -ones]) * scale
-    # Coefficients in units of the model's forces: mean and standard deviation of each.
-    mean = np.array([1.0, 1.0, *[0.0] * (matrix.shape[1] - 2)])
-    width = np.array([masses, masses, *[np.inf] * len(resisting),
-                      table.CONSTANT, table.CONSTANT])
-    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, effort[known]]), mode='r'))
-    variance = total / count
-    for _ in range(3):
-        weight = np.sqrt(variance * count / table.SAMPLES) / width
-        found, _ = nnls(np.vstack([triangle[:, :-1], np.diag(weight)]),
-                        np.concatenate([triangle[:, -1], weight * mean]))
-        rest = triangle[:, -1] - triangle[:, :-1] @ found
-        variance = max(float(rest @ rest), table.CLOSEST * swing) / count
-    misfit = 0.5 * ((found - mean) / width) ** 2
-    # Masses are off by factors.
-    misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
-    rigid = matrix[:, :2]
-    moves = np.linalg.norm(rigid, axis=0) > table.WEAK * np.linalg.norm(rigid)
-    if abs(scale) != 1 and np.all(misfit[:2][moves] > table.MASSES_MOST):
-        return Likelihood(-table.MASSES_MOST, 1.0)  # neither weight nor inertia has this unit
-    cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves]) + np.sum(misfit[2:]))
-    # Friction beyond some times the rigid body's forces is unlikely.
-    friction, weight_of = (root_mean_square(each) + 1e-300 for each in (
-        matrix[:, 2:5] @ found[2:5], rigid @ np.ones(2)))
-    excess = float(np.log(friction / weight_of / table.FRICTION))
-    cost += min(0.5 * max(excess, 0.0) ** 2, table.FRICTION_MOST)
-    score = -0.5 * table.SAMPLES * float(np.log(variance * count / swing)) - cost
-    # A residual that is larger than the effort is no worse than one that is as large.
-    return Likelihood(max(score, -table.MASSES_MOST),
-                      variance * count / float(np.sqrt(swing * total)))
 
 
 @dataclass(frozen=True)
@@ -191,32 +260,25 @@ class Shares:
     noise: float
 
     @classmethod
-    def of(cls, effort: Array, parts: Parts, drive: int, noise: float = np.inf) -> Shares:
-        """Return the shares of efforts, (N,), of a drive, with its fast noise [N, N m]."""
-        inertia, gravity, velocity, direction = (part[:, drive] for part in (
-            parts.inertia, parts.gravity, parts.velocity, parts.direction))
-        swing = float(np.std(effort))
-        columns = [inertia, gravity, velocity, direction]
-        found, doubts, left = fitted(effort, [*columns, np.ones_like(effort)])
+    def of(cls, evidence: Evidence, drive: int, column: int, noise: float = np.inf) -> Shares:
+        """Return the shares of efforts of a drive, with their fast noise [N, N m]."""
+        root, count = evidence.roots[drive, column], float(evidence.count[drive, column])
+        effort, ones = root[:, EFFORT], root[:, CONSTANT]
+        swing = float(np.sqrt(max(effort @ effort - (effort @ ones) ** 2 / count, 1e-300)))
+        parts = [root[:, k] for k in (INERTIA, GRAVITY, VELOCITY, DIRECTION)]
+        found, doubts, left = fitted(effort, [*parts, ones])
         share, doubt = found[1], doubts[1]
-        if np.std(gravity) < table.STEADY * root_mean_square(gravity):
+        if _is_steady(root, parts[1]):
             # A weight that hardly changes cannot be separated from a constant: it is one.
-            alone, alone_doubts, _ = fitted(effort, columns)
+            alone, alone_doubts, _ = fitted(effort, parts)
             share, doubt = alone[1], alone_doubts[1]
-        resistance = found[2] * velocity + found[3] * direction
-        friction = root_mean_square(resistance) * float(np.sign(np.mean(resistance * velocity)))
-        return cls(found[0], doubts[0], share, doubt, found[2] * float(np.std(velocity)) / swing,
-                   abs(found[3]) * float(np.std(direction)) / swing, friction / swing,
-                   left * float(np.sqrt(2 / len(effort))) / swing, left / swing, noise / swing)
-
-    @property
-    def scale(self) -> tuple[float, float]:
-        """Factor of weight and inertia over the model's, and its doubt."""
-        weights = [1 / max(doubt, 1e-6) ** 2 for doubt in (self.gravity_doubt, self.inertia_doubt)]
-        if not sum(weights) > 0:
-            return 0.0, float('inf')
-        mean = float(np.average([self.gravity, self.inertia], weights=weights))
-        return mean, float(1 / np.sqrt(sum(weights)))
+        viscous, dry = found[2] * parts[2], found[3] * parts[3]
+        friction = float(np.linalg.norm(viscous + dry) * np.sign((viscous + dry) @ parts[2]))
+        return cls(found[0], doubts[0], share, doubt,
+                   float(np.sign(found[2]) * np.linalg.norm(viscous)) / swing,
+                   float(np.linalg.norm(dry)) / swing, friction / swing,
+                   left * float(np.sqrt(2 / count)) / swing, left / swing,
+                   noise * float(np.sqrt(count)) / swing)
 
     @property
     def lacks_inertia(self) -> bool:
@@ -268,22 +330,20 @@ class Shares:
         return table.NOISE_FREE if is_exact else ''
 
 
-def effort_contents(model: DriveModel, recording: Recording, excerpt: Excerpt | None = None,
+def effort_contents(model: DriveModel, recording: Recording, evidence: Evidence | None = None,
                     ) -> dict[str, Shares]:
     """Return the shares of the efforts of drives that move and have enough samples."""
-    excerpt = excerpt or excerpt_of(recording, table.STRETCHES)
-    parts = None if excerpt is None else parts_of(model, excerpt, plain(len(model.drives)))
-    if excerpt is None or parts is None:
+    if evidence is None:
+        excerpt = excerpt_of(recording, table.STRETCHES)
+        evidence = None if excerpt is None else Evidence.of(
+            model, excerpt, plain(len(model.drives)))
+    if evidence is None:
         return {}
     width = np.broadcast_to(model.reversal.velocity, (len(model.drives),))
-    found = {}
-    for d, drive in enumerate(model.drives):
-        known = np.isfinite(excerpt.effort[:, d])
-        effort = excerpt.effort[known, d]
-        if (known.sum() >= table.LEAST_MEANS and np.ptp(effort) > 0
-                and root_mean_square(parts.velocity[known, d]) > width[d]):
-            found[drive] = Shares.of(effort, parts.rows(known), d, _fast_noise(recording, d))
-    return found
+    return {drive: Shares.of(evidence, d, d, _fast_noise(recording, d))
+            for d, drive in enumerate(model.drives)
+            if evidence.count[d, d] >= table.LEAST_MEANS and evidence.speed[d] > width[d]
+            and np.ptp(recording.effort[np.isfinite(recording.effort[:, d]), d]) > 0}
 
 
 def _fast_noise(recording: Recording, drive: int) -> float:
@@ -308,33 +368,23 @@ def _fast_noise(recording: Recording, drive: int) -> float:
                      np.min(np.diff(values)) / np.sqrt(12)))
 
 
-def rigid_factor(effort: Array, parts: Parts, drive: int) -> float:
-    """Return the factor of a model's inertia and gravity together in efforts, (N,); 0 for none."""
-    known = np.isfinite(effort) & np.isfinite(parts.inertia[:, drive])
-    rigid, velocity, direction = (part[known, drive] for part in (
-        parts.inertia + parts.gravity, parts.velocity, parts.direction))
-    is_steady = np.std(rigid) < table.STEADY * root_mean_square(rigid)
-    return fitted(effort[known], [rigid, velocity, direction, *(
-        [] if is_steady else [np.ones_like(rigid)])])[0][0]
-
-
 def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[float], float]:
-    """Return coefficients, their doubts and the residual's root mean square.
+    """Return coefficients, their doubts and the norm of the residual.
 
     Columns that are combinations of others, or 0, have the coefficient 0 and infinite doubt.
     """
     matrix = np.column_stack(columns)
-    sizes = np.sqrt(np.mean(matrix ** 2, axis=0))
+    sizes = np.linalg.norm(matrix, axis=0)
     used = np.flatnonzero(sizes > 0)
     unit = matrix[:, used] / sizes[used]
     solution = np.linalg.lstsq(unit, effort, rcond=CONDITION)[0]
-    left = root_mean_square(effort - unit @ solution)
+    left = float(np.linalg.norm(effort - unit @ solution))
     values, doubts = [0.0] * len(columns), [np.inf] * len(columns)
     for k, column in enumerate(used):
         others = np.delete(unit, k, axis=1)
         beyond = unit[:, k] - others @ np.linalg.lstsq(others, unit[:, k], rcond=CONDITION)[0]
-        alone = root_mean_square(beyond)
-        if alone > CONDITION:
+        alone = float(np.linalg.norm(beyond))
+        if alone > 10 * CONDITION:
             values[column] = float(solution[k] / sizes[column])
             doubts[column] = left / (alone * float(sizes[column]))
     return values, doubts, left

@@ -12,13 +12,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.measurement.files.samples import Indices
 
 # ------------------------------------------------------------------------------------- units
 
@@ -29,9 +31,9 @@ ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns', TICK: 'ticks of 4096 p
 COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
           for bits in (10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
+KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
-EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', 1 / 0.0980665: 'kgf cm'}
-PREFIXES = (1e3, 1e-3)
+EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
 OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
@@ -39,7 +41,10 @@ SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille'}
+EITHER = 'kgf cm or amperes'
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
+# Directions of gravity in the base of a robot on a wall or under a ceiling.
+MOUNTINGS = {(0, 0, 1): '+z', (1, 0, 0): '+x', (-1, 0, 0): '-x', (0, 1, 0): '+y', (0, -1, 0): '-y'}
 
 # ------------------------------------------------------------------------ likelihood and priors
 
@@ -57,7 +62,7 @@ REVERSAL = 0.2
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'mounting': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
         'drive_constant': 10.0}
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
@@ -67,15 +72,15 @@ STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
 BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the given one
-CLOSE_FIT = 2e-3  # residual that leaves nothing to look for
+CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
+# The same, with which only other orders of drives are tried, and the prior cost of the masses.
+EXPLAINED, PLAUSIBLE = 0.03, 3.0
 WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
 
 # ------------------------------------------------------------------------- scales of efforts
 
 NEAR_UNIT, AT_UNIT = 0.15, 0.05  # relative distance from a unit's constant; a sure one
 SAME_MASSES = 3.0  # factor by which masses of a description are off at most
-ONE_FACTOR, SEVERAL_FACTORS = 0.25, 0.5  # spread of logarithms: one factor, several factors
-LARGEST_OVERLOAD = 4.0  # largest effort over the rated one
 CERTAIN = 3.0  # standard errors
 
 # ---------------------------------------------------------------- efforts that are not measured
@@ -93,11 +98,7 @@ NORMAL = 1.4826  # standard deviation over the median of absolute values
 STEADY = 0.1  # a weight whose swing is a smaller share of its size is a constant
 NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion [s]
 
-# ------------------------------------------------------------------- changes within a recording
-
-CHANGES = {1e-3: 'in k{}', 1e3: 'in m{}', -1.0: 'negated'}
-CLEARLY = 3.0  # times that a changed reading fits better
-LEAST_PART = 0.1  # share of a recording that a change lasts
+CLEARLY = 3.0  # times that efforts without their sign fit better
 BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 
 # ----------------------------------------------------------------------- columns by their names
@@ -181,40 +182,41 @@ class Reading:
         The mistake as a clause.
     drives : tuple of int
         Those it concerns.
-    position, effort : (D, D) arrays
-        From recorded to true values, for a row of drives.
     cost : float
         Prior cost [nats].
-    offset : (D,) array, optional
-        Added to positions.
+    scale, offset : (D,) arrays
+        Factors of recorded positions, and what is added to them.
+    positions, efforts : (D,) int arrays
+        Recorded columns of the drives' positions and efforts.
+    gravity : (3,) array, optional
+        Direction of gravity in the base, if it is not the model's.
     """
 
     kind: str
     what: str
     drives: tuple[int, ...]
-    position: Array
-    effort: Array
     cost: float
-    offset: Array | float = 0.0
+    scale: Array
+    offset: Array
+    positions: Indices
+    efforts: Indices
+    gravity: Array | None = None
 
-    def effort_of(self, effort: Array) -> Array:
-        """Return recorded efforts, (N, D), in this reading; NaN where not measured."""
-        known = np.isfinite(effort)
-        read: Array = np.where(known, effort, 0.0) @ self.effort.T
-        # A drive that was not measured must not make the others so.
-        read[(~known).astype(float) @ np.abs(self.effort).T > 0] = np.nan
-        return read
+    def changed(self, kind: str, what: str, drives: tuple[int, ...], cost: float, **more: Any,
+                ) -> Reading:
+        """Return another reading that differs in some arrays."""
+        return replace(self, kind=kind, what=what, drives=drives, cost=cost, **more)
 
 
 def plain(count: int) -> Reading:
     """Return the reading of D drives by names and units."""
-    same = np.eye(count)
-    return Reading('', '', (), same, same, 0.0)
+    same = np.arange(count)
+    return Reading('', '', (), 0.0, np.ones(count), np.zeros(count), same, same)
 
 
 def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: bool = False,
              ) -> Iterator[Reading]:
-    """Yield all readings of D drives but the plain one; those that need a close look last.
+    """Yield all readings of D drives but the plain one, those of another order last.
 
     Parameters
     ----------
@@ -224,47 +226,52 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: b
         Whether all positions are whole numbers, as encoders count.
     """
     count = len(drives)
-    same, every = np.eye(count), tuple(range(count))
+    first, every = plain(count), tuple(range(count))
     angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for names, turns in ((LENGTHS, False), (angles, True)):
         alike = tuple(k for k in every if units[k].turns == turns)
         for unit, name in names.items():
             # Encoders of a robot's turning joints count alike; its rails may not.
             for group in _groups(drives, alike)[:1 if turns else None]:
-                scale = np.diag(_scaled(count, group, unit))
+                scale = _scaled(count, group, unit)
                 cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
                 what = f'the {_position(drives, group)} like {name}'
-                yield Reading('position_unit', what, group, scale, same, cost)
+                yield first.changed('position_unit', what, group, cost, scale=scale)
                 if unit == TICK or unit in COUNTS:
-                    middle = np.where(_scaled(count, group, -1.0) < 0, -math.pi, 0.0)
-                    yield Reading(
+                    yield first.changed(
                         'position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
-                        scale, same, cost + 1, middle)
+                        cost + 1, scale=scale,
+                        offset=np.where(_scaled(count, group, -1.0) < 0, -math.pi, 0.0))
     for group in _groups(drives, every):
-        yield Reading('position_sign', f'the {_position(drives, group)} negated', group,
-                      np.diag(_scaled(count, group, -1.0)), same, COST['position_sign'] + (
-                          ALL_NEGATED if len(group) == count > 1 else 0.0))
+        yield first.changed(
+            'position_sign', f'the {_position(drives, group)} negated', group,
+            COST['position_sign'] + (ALL_NEGATED if len(group) == count > 1 else 0.0),
+            scale=_scaled(count, group, -1.0))
+    for direction, name in MOUNTINGS.items():
+        yield first.changed(
+            'mounting', f'the base looks mounted so that gravity points along its {name}', every,
+            COST['mounting'], gravity=np.array(direction, float))
     for order in _orders(count):
         moved = tuple(k for k in every if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
-        turned = same[list(order)]
-        for noun, position, effort in (('drives', turned, turned), ('positions', turned, same),
-                                       ('efforts', same, turned)):
-            yield Reading('drive_order', f'the {noun} look recorded in another order: {listed}',
-                          moved, position, effort, COST['drive_order'])
+        turned = np.array(order)
+        for noun, changes in (('drives', {'positions': turned, 'efforts': turned}),
+                              ('positions', {'positions': turned}), ('efforts', {
+                                  'efforts': turned})):
+            yield first.changed('drive_order', f'the {noun} look recorded in another order: '
+                                f'{listed}', moved, COST['drive_order'], **changes)
 
 
 def quarter_turn(drives: tuple[str, ...], drive: int, turn: float, before: Reading) -> Reading:
     """Return another reading, with the zero of one drive a quarter turn or two elsewhere."""
-    offset = np.zeros(len(drives)) + before.offset
+    offset = before.offset.copy()
     offset[drive] += turn
     group = tuple(np.flatnonzero(offset).tolist())
     listed = ', '.join(f'{QUARTERS.get(float(offset[k]), np.rad2deg(offset[k])):g} degrees '
                        f'({drives[k]})' for k in group)
-    return Reading('position_offset', f'the zero of {named(drives, group)} looks off: {listed} are '
-                   'to be added to its positions, or the base is mounted otherwise than the model '
-                   'says (gravity)', group, before.position, before.effort,
-                   before.cost + COST['position_offset'], offset)
+    return before.changed('position_offset', f'the zero of {named(drives, group)} looks off: '
+                          f'{listed} are to be added to its positions', group,
+                          before.cost + COST['position_offset'], offset=offset)
 
 
 def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A few hundred samples of a recording, smoothed, and the forces of a model on them."""
+"""A few hundred samples of a recording, smoothed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.residuals.reconstruction import follow
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.model.drive_model import DriveModel
 
-LONGEST = 2000  # samples of a stretch that are smoothed: 4 s at 500 Hz
-MOST_BLOCKS = 100  # of a stretch that are kept: a hundredth of a second each, evenly thinned
+LONGEST = 1000  # samples of a stretch that are smoothed: 2 s at 500 Hz
+MOST_BLOCKS = 200  # that are kept, of a hundredth of a second each, evenly thinned
 PIECE = 10  # blocks that are followed together where a whole stretch cannot be
 
 
@@ -69,11 +67,11 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0) -> 
     except PprsError:
         return None
     treat = Treatment(smooth.block_starts, len(smooth.index))
+    step = max(1, len(treat) // MOST_BLOCKS)
     kept: list[int] = []
     segments: list[slice] = []
     for segment in smooth.segments:
         first, last = np.searchsorted(treat.starts, (segment.start, segment.stop))
-        step = max(1, (last - first) // MOST_BLOCKS)
         segments.append(slice(len(kept), len(kept) + len(range(first, last, step))))
         kept += range(first, last, step)
 
@@ -87,22 +85,3 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0) -> 
     velocity = None if recording.velocity is None else means(recording.velocity[smooth.index])
     return Excerpt(motion, means(scaled.time[smooth.index, None])[:, 0],
                    means(recording.effort[smooth.index]), velocity)
-
-
-def forces_on(model: DriveModel, motion: DriveMotion, time: Array) -> Array | None:
-    """Return the model's forces on a motion of the drives, (N, D) [N]; None where it has none.
-
-    That the mechanism cannot follow a motion says as much as its forces: nothing is raised.
-    """
-    moved = replace(motion, position=motion.position - model.position_error(motion.position))
-    found = np.empty_like(motion.position)
-    with np.errstate(all='ignore'):
-        try:
-            followed = follow(model, time, moved)
-            for part in motion.segments:
-                state = model.initial_state()
-                stretch = followed[part].with_time(time[part])
-                found[part] = model.measured(model.drive_forces(stretch, state), state).total
-        except (PprsError, np.linalg.LinAlgError):
-            return None
-    return found if np.all(np.isfinite(found)) else None
