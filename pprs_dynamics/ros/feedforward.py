@@ -324,8 +324,8 @@ class FeedforwardNode(ManagedNode):
         elif ended:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
         else:
-            reason = ('the clock has stood still' if clock_stands else 'no valid trajectory')
-            text = f'{reason} for {timeout:g} s: {done}'
+            text = ('ROS time does not advance' if clock_stands
+                    else f'no valid trajectory for {timeout:g} s') + f': {done}'
             self._status.report('STALE', 'STALE', text)
             self._log.warning('stale', text)
 
