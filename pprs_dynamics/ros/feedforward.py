@@ -196,7 +196,8 @@ class FeedforwardNode(ManagedNode):
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
         # Without a clock nothing can be said of a stamp, and a wait for it would not end.
-        self._watchdog.feed(request.end - (now or request.start))
+        self._watchdog.feed(
+            request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
             self._lag.add(max(0.0, _since(info['received_timestamp'])
