@@ -15,7 +15,9 @@ from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, outp
 from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
+from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
+from pprs_dynamics.drives import common_unit
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -37,6 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
+    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
+                        help='picture of positions and efforts as they are read')
     parser.add_argument('--overwrite', action='store_true', help='replace an existing model file')
 
 
@@ -59,8 +63,14 @@ def run(options: argparse.Namespace) -> int:
         for line in first.questions:
             screen.print(f'  {shown(line)}')
         return 1
-    _, summaries = show_recordings(first.model, list(map(str, first.recordings)), None,
-                                   screen, by_column=True)
+    recordings, summaries = show_recordings(first.model, list(map(str, first.recordings)), None,
+                                            screen, by_column=True)
+    if options.picture and recordings:
+        save(plot_over_time(recordings[0].time, {
+            f'{what} [{common_unit(first.model.units, unit)}]': dict(
+                zip(first.model.drives, values.T, strict=True))
+            for what, unit, values in (('position', 'm', recordings[0].position),
+                                       ('effort', 'N', recordings[0].effort))}), options.picture)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)
