@@ -39,8 +39,6 @@ COUNT = 8  # mutants of a module
 TIMEOUT = 240.0  # [s] for the tests of a mutant; one that hangs them is killed
 # Substitutes that no hand would write and any test would see: they would only flatter the share.
 CHEAP = ('LShift', 'RShift', 'BitAnd', 'BitOr', 'BitXor', '_Invert', 'USub_Not', 'RemoveDecorator')
-# No module of these is imported by pytest before a test asks for it.
-UNCOMPILED = "import sys\nsys.modules['numba'] = None\n"
 
 SEARCH = ('inference/test_invariants_of_diagnosis.py', 'inference/test_search.py')
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
@@ -151,14 +149,14 @@ def _tried(module: str, count: int) -> Iterator[Mutant]:
         for name in COPIED:
             shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns('__pycache__'))
         shutil.copy(ROOT / 'pyproject.toml', copy)
-        (copy / 'uncompiled.py').write_text(UNCOMPILED)
         path = copy / 'pprs_dynamics' / module
         tests = [str(copy / 'test' / name) for name in TESTS[module]]
         sources = ':'.join(str(copy / part) for part in (
             '', 'test', 'test/support', 'demo', 'benchmarks'))
         # From the copy's folder: `python -m` finds modules there before all others.
-        command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} '
-                   '-m pytest -x -q -m "not slow" -p uncompiled -p no:cacheprovider '
+        command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 '
+                   f'NUMBA_DISABLE_JIT=1 {sys.executable} '
+                   '-m pytest -x -q -m "not slow" -p no:cacheprovider '
                    f'--rootdir {copy} '
                    f'{" ".join(tests)}')
         outcome, output = run_tests(command, TIMEOUT)

@@ -116,10 +116,6 @@ class Model(NamedTuple):
         The same for coordinates.
     path : (K, 2) int array
         Joints between closures' two links, and 1 on the side of B, -1 on that of A.
-    starts : (passive + 1, 3) int array
-        Where lists begin in `swap`, `below` and `right`.
-    swap, below, right : int arrays
-        The order in which J_p is eliminated; see `closures`.
     """
 
     joints: Integers
@@ -129,10 +125,6 @@ class Model(NamedTuple):
     closures: Integers
     rows: Integers
     path: Integers
-    starts: Integers
-    swap: Integers
-    below: Integers
-    right: Integers
     frames: Array
     ratio: Array
     offset: Array
@@ -235,7 +227,7 @@ TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4
 
 # Names of the numbers of rows of the tables, and of the columns of some.
 SIZES = ('frames', 'joints', 'coordinates', 'drives', 'passive', 'loops', 'closure_frames', 'rows',
-         'path', 'starts', 'swap', 'below', 'right', 'links', 'forces', 'loop_forces', 'solved')
+         'path', 'links', 'forces', 'loop_forces', 'solved')
 
 
 def _sizes_of(t: Model) -> Integers:
@@ -251,8 +243,7 @@ SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
     Model: {
         'joints': ('joints', 3), 'passive': ('passive',), 'drives': ('drives',),
         'places': ('coordinates', 2), 'closures': ('loops', 4), 'rows': ('rows', 6),
-        'path': ('path', 2), 'starts': ('starts', 3), 'swap': ('swap',), 'below': ('below',),
-        'right': ('right',), 'frames': ('frames', 3), 'ratio': ('joints',),
+        'path': ('path', 2), 'frames': ('frames', 3), 'ratio': ('joints',),
         'offset': ('joints',), 'stride': ('drives',), 'closure_frames': ('closure_frames', 3),
         'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
     Data: {
@@ -323,6 +314,14 @@ def _reader(kind: type) -> Callable[..., Any]:
     exec('\n'.join(lines), namespace)
     read: Callable[..., Any] = namespace['read']
     return read
+
+
+def elements(named: Any) -> Any:
+    """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
+
+    Compiled code takes the arrays unchanged.
+    """
+    return type(named)(*(array.data for array in named))
 
 
 def _is_real(name: str) -> bool:

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
+from math import tanh
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample, vector
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.three_pprs.active_friction import drive_friction
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
@@ -101,7 +101,7 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, pa
             _write_twist(parts, s, i, 1.0, inverse.slides[i])
             _write_twist(parts, s, CHAINS + i, c.sin_u, inverse.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)
-    return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)
+    return are_within_reach(rods, p.minimum_sine) and bound <= p.bound
 
 
 @each_chain
@@ -119,7 +119,7 @@ def _write_forces(
 ) -> None:
     """Write the parts of a drive's force, and their sum."""
     c, mu, width = p.drives[drive]
-    active = drive_friction(c, mu, velocity, load, smooth_sign(velocity, width))
+    active = drive_friction(c, mu, velocity, load, tanh(velocity / width))
     parts[TOTAL, s, drive] = rigid_body + active + passive                     # Eq. (14)
     parts[RIGID, s, drive], parts[ACTIVE, s, drive] = rigid_body, active
     parts[PASSIVE, s, drive] = passive

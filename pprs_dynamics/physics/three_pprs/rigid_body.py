@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.motion_sample import (
     MotionSample,
     turned,
@@ -26,6 +25,7 @@ from pprs_dynamics.physics.mechanism.vectors import (
     minus,
     plus,
     product,
+    sqrt,
     times,
 )
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
