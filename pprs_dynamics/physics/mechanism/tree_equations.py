@@ -30,6 +30,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     AXIS,
     B_P,
     B_R,
+    COEFFICIENT,
     CONDITION,
     COORDINATE,
     COULOMB,
@@ -614,7 +615,8 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     Parameters
     ----------
     drives : (OF_DRIVE, D) array
-        Armature [kg m^2, kg], viscous and Coulomb friction, offset, and width of the sign.
+        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, and width
+        of the sign.
     v, a : (D,) arrays
         Velocities and accelerations of the drives.
     efforts : (EFFORTS, D) array
@@ -622,8 +624,9 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     """
     for d in range(len(v)):
         efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
+        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * abs(efforts[TRANSMITTED, d])
         efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
-                                      + drives[COULOMB, d] * tanh(v[d] / drives[WIDTH, d]))
+                                      + dry * tanh(v[d] / drives[WIDTH, d]))
         efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
                              + efforts[JOINT_EFFORT, d])
 

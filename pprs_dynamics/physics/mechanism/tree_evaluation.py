@@ -68,12 +68,18 @@ class InverseDynamicsResult:
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
         By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
+    motion : three (N, D) arrays
+        Position, velocity and acceleration of the drives.
     """
 
-    __slots__ = ('efforts', 'q')
+    __slots__ = ('efforts', 'motion', 'q')
 
-    def __init__(self, q: Array, efforts: Array) -> None:
-        self.q, self.efforts = q, efforts
+    def __init__(self, q: Array, efforts: Array, motion: tuple[Array, Array, Array]) -> None:
+        self.q, self.efforts, self.motion = q, efforts, motion
+
+    def drive_motion(self) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration of the drives."""
+        return self.motion
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
@@ -267,7 +273,7 @@ class Evaluation:
             given, start, np.empty((1, self._lengths[0])), MOTION | FORCES, gravity, nearby,
             inertial, np.empty((1, self._lengths[1])), friction,
             self._no_actuators if actuators is None else actuators, closed, efforts)
-        return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
+        return None if failed >= 0 else InverseDynamicsResult(closed, efforts, motion)
 
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
              gravity: Array, nearby: Array | None, inertial: Array | None = None,

@@ -221,7 +221,7 @@ class JointFriction(NamedTuple):
 
 
 # Rows of the parameters of drives, and of the efforts that follow from them.
-ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
+ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
 
 

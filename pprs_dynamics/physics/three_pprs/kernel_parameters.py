@@ -84,7 +84,7 @@ class Joints(NamedTuple):
     d_s: Value = 0.0
 
     @classmethod
-    def of(cls, blocks: Mapping[str, Mapping[str, float]], width: float) -> Joints:
+    def of(cls, blocks: Mapping[str, Mapping[str, float]], width: float, printed: bool) -> Joints:
         """Return the friction of blocks `revolute` and `spherical`; 0 by default.
 
         Parameters
@@ -92,8 +92,9 @@ class Joints(NamedTuple):
         blocks : mapping of str to mapping
             `viscous`, `torque`, `coulomb` and `radius`.
         width : float
+        printed : bool
         """
-        return cls(width, 0.0, *(
+        return cls(width, float(printed), *(
             factor * block.get(key, 0.0)
             for block in (blocks.get(REVOLUTE, {}), blocks.get(SPHERICAL, {}))
             for key, factor in (('viscous', 1.0), ('torque', 1.0), ('coulomb', 1.0),

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
+from pprs_dynamics.physics.model.keys import APPROACHES
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -131,7 +131,7 @@ def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
             if values[f'friction.{joint}.diameter']), 'friction.spherical.viscous'):
         if np.any(values[key]):
             yield key, None
-    if values['friction.approach'] != WholeMechanismFriction.approach:
+    if values['friction.approach'] != APPROACHES[0]:
         yield 'friction.approach', None
     if values['equations'] != 'corrected':
         yield 'equations', None
