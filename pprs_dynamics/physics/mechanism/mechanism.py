@@ -139,7 +139,7 @@ class Mechanism:
         return float(self.masses.sum())
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       ) -> JointFriction:
+                       is_own: bool = False) -> JointFriction:
         """Return friction of joints as `MechanismState.against_friction` takes it.
 
         Parameters

@@ -84,8 +84,12 @@ class Robot(Protocol):
     def position_step(self) -> float:
         """Step of a drive for derivatives by its position [rad, m]."""
 
-    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal) -> Any:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                       is_own: bool = False) -> Any:
+        """Return friction of joints as `MechanismState.against_friction` takes it.
+
+        `is_own` says that a model file states it for the robot.
+        """
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          closed: dict[Any, Array] | None = None) -> Any:

@@ -298,9 +298,12 @@ class ThreePprs:
         return POSITION_STEP * self.geometry.rod_length
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       ) -> Joints:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
-        return Joints.of(blocks, reversal.rate, self.printed)
+                       is_own: bool = False) -> Joints:
+        """Return friction of joints as `MechanismState.against_friction` takes it.
+
+        Only the model's own may be printed.
+        """
+        return Joints.of(blocks, reversal.rate, is_own and self.printed)
 
     def heavier(self, link: str, mass: float) -> ThreePprs:
         """Return the robot with a payload, or with rods, that weigh more [kg].

@@ -131,5 +131,5 @@ class ModelJointFriction(Effect):
     def table(self, robot: Any, reversal: Reversal) -> Any:
         """Return its friction as states of a robot take it, once for each way to turn over."""
         if reversal not in self._tables:
-            self._tables[reversal] = robot.friction_table(self.blocks, reversal)
+            self._tables[reversal] = robot.friction_table(self.blocks, reversal, is_own=True)
         return self._tables[reversal]
