@@ -25,6 +25,7 @@ from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,
@@ -39,7 +40,7 @@ from pprs_dynamics.simulation.injected_forms import (
     eyring,
     tilted,
 )
-from pprs_dynamics.simulation.platform import BALLS, HINGES, RODS, PlatformMechanism
+from pprs_dynamics.simulation.platform import PlatformMechanism
 from pprs_dynamics.simulation.temperatures import (
     REFERENCE,
     draw_temperatures,

@@ -16,11 +16,8 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, SPHERICAL
 from pprs_dynamics.simulation.export.exported_robot import described
-from pprs_dynamics.simulation.export.expressed import MJCF
+from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, MJCF
 from pprs_dynamics.simulation.export.writers import written
-
-CHAINS = (1, 2, 3)
-HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in CHAINS) for part in ('hinge', 'ball', 'rod'))
 
 
 @dataclass(frozen=True, kw_only=True)

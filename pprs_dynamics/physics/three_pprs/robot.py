@@ -362,10 +362,9 @@ class ThreePprs:
         first = evaluate(closed_form.forces_kernel, parameters, rows, closed_form.NO_LOAD, table)
         return PassResult(table) if first < 0 else None
 
-    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
-                     ) -> Mechanism:
+    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
-        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts), is_free)
+        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts))
         bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
         return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(COUNT),
                          self.gravity)

@@ -1,11 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Any model as a mechanism: a tree of bodies with closures, for files of simulators.
-
-In MJCF the platform of a 3-PPRS is free and held by three balls. In URDF it hangs on the first
-chain by three hinges in a row, and two balls are cut: programs without free joints draw it, too.
-"""
+"""Any model as a mechanism: a tree of bodies with closures, for files of simulators."""
 
 from __future__ import annotations
 
@@ -114,8 +110,8 @@ class ExportedRobot:
                 yield name, row, frame
 
 
-def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
-    """Return what a file of a format says.
+def export_robot(expressed: Expressed) -> ExportedRobot:
+    """Return the robot that a file describes.
 
     Raises
     ------
@@ -125,9 +121,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     model, robot = expressed.model, expressed.robot
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    limits = model.limits
-    mechanism = robot.as_mechanism(limits.strokes, limits.efforts, is_free=kind != URDF)
-    return described('three_pprs', mechanism, expressed.joints)
+    return described('three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts),
+                     expressed.joints)
 
 
 def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
@@ -216,7 +211,7 @@ class TreePositions:
     """
 
     def __init__(self, model: DriveModel) -> None:
-        robot = export_robot(express(model, URDF), URDF)
+        robot = export_robot(express(model, URDF))
         self._mechanism = robot.mechanism
         joints = [body for body in robot.bodies if body.kind != FREE]
         free = [body for body in robot.bodies if body.kind == FREE]
