@@ -69,8 +69,8 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.effects_block import effect_uncertainties
 from pprs_dynamics.physics.model.forces import Forces
-from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is

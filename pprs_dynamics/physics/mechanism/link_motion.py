@@ -13,13 +13,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame
+from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    OPEN_IN_MOTION,
-    WORST_CONDITION,
-    residual,
-)
+from pprs_dynamics.physics.mechanism.tree_equations import OPEN_IN_MOTION, WORST_CONDITION, residual
 from pprs_dynamics.physics.mechanism.tree_tables import (
     CONDITION,
     DETERMINANT,

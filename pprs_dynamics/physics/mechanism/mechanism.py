@@ -23,11 +23,16 @@ from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, i
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.places import MECHANISM, SLIDE, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import (
+    MECHANISM,
+    SLIDE,
+    BodyPlace,
+    MechanismState,
+    PassiveJoint,
+    StructureLoad,
+)
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult

@@ -33,9 +33,8 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
 from pprs_dynamics.physics.model.keys import (

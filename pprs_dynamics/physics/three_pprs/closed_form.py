@@ -12,13 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample, vector
-from pprs_dynamics.physics.mechanism.tree_tables import (
-    DRIVE_FRICTION,
-    JOINT_EFFORT,
-    RIGID,
-    TOTAL,
-)
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.mechanism.tree_tables import DRIVE_FRICTION, JOINT_EFFORT, RIGID, TOTAL
 from pprs_dynamics.physics.three_pprs.closure import (
     Twist,
     Wrench,
@@ -31,7 +25,12 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     are_within_reach,
     chain_motions,
 )
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    CHAINS,
+    Joints,
+    RobotParameters,
+    each_chain,
+)
 from pprs_dynamics.physics.three_pprs.passive_joints import (
     JointResistance,
     friction_forces,

@@ -12,14 +12,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.motion_sample import (
-    MotionSample,
-    Rotation,
-    turned,
-)
+from pprs_dynamics.physics.mechanism.motion_sample import MotionSample, Rotation, turned
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain, sqrt
-from pprs_dynamics.physics.three_pprs.chains import each_chain
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters, each_chain
 
 
 class ChainSample(NamedTuple):

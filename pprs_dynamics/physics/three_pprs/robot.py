@@ -17,21 +17,20 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
-from pprs_dynamics.errors import (
-    ConvergenceError,
-    ModelError,
-    SingularityError,
-    WorkspaceError,
-)
+from pprs_dynamics.errors import ConvergenceError, ModelError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
-from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import (
+    PLATFORM,
+    BodyPlace,
+    MechanismState,
+    PassiveJoint,
+    StructureLoad,
+)
 from pprs_dynamics.physics.mechanism.tree_tables import (
     COEFFICIENT,
     JOINT_EFFORT,

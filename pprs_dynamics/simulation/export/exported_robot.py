@@ -14,19 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.description import (
-    FLOATING,
-    Frame,
-    principal_inertia,
-)
+from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, principal_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.export.expressed import (
-    URDF,
-    Expressed,
-    express,
-)
+from pprs_dynamics.simulation.export.expressed import URDF, Expressed, express
 
 FREE, HINGE, SLIDE = 'free', 'hinge', 'slide'
 # Simulators want some mass of everything that moves [kg, kg m^2]; ten decimals below real ones.

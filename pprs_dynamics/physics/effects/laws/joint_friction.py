@@ -17,9 +17,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 
