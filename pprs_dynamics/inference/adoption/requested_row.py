@@ -24,7 +24,7 @@ from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES, with_uncertainties
+from pprs_dynamics.physics.model.effects_block import UNCERTAINTIES, with_uncertainties
 
 SURE = 2.0  # standard deviations by which a number must differ from 0
 

@@ -14,7 +14,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
+from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from
