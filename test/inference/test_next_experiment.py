@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
-from pprs_dynamics.inference.experiments.criteria import Information, whitened
+from pprs_dynamics.inference.experiments.information import (
+    ColumnPlan,
+    FittedTerm,
+    Information,
+    whitened,
+)
 from pprs_dynamics.inference.experiments.motion_design import (
+    MotionLimits,
     Motions,
     NoMotionError,
     platform_motion,
 )
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import PurposeError, next_experiment
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
