@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks.scores import localisation as benchmark
-from pprs_dynamics.inference.diagnosis.localisation import localise
+from pprs_dynamics.inference.diagnosis.comparison import localise
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 FIRST_SEED = 40_000  # none of the benchmark's

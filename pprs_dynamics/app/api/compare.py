@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
-from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements

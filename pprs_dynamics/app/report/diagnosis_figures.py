@@ -23,8 +23,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, with_error
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals

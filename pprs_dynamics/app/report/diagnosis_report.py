@@ -24,8 +24,7 @@ from pprs_dynamics.app.report.terminal import (
     verdict_panel,
 )
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, RivalEffect
 from pprs_dynamics.inference.diagnosis.quantities import (
     listed,
     name_drives,
@@ -152,8 +151,8 @@ def _tables(diagnosis: Diagnosis) -> Iterator[tuple[str, str, Sequence[str],
     if diagnosis.candidates:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                ('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
-               [(candidate.name, f'{candidate.evidence:.0f}', f'{candidate.error_after:.3f}',
-                 sites(candidate.drives, diagnosis)) for candidate in diagnosis.candidates])
+               [(candidate.name, f'{-candidate.cost:.0f}', f'{candidate.error_after:.3f}',
+                 sites(candidate.names[0][1], diagnosis)) for candidate in diagnosis.candidates])
     if rows := detectable_rows(diagnosis):
         yield ('Smallest effects that would have been reported', 'Each alone would have cost 10 '
                'less than the answer at the noise of these recordings.', ('effect', 'size'), rows)

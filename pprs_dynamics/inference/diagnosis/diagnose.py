@@ -68,13 +68,13 @@ def diagnose(
     other, sticking = ({}, {}) if as_it_is else _gate(model, recordings, decisions, reference)
     if other or sticking:
         table = input_model_alone(model, recordings, decisions, report)
-        bare = Answer(table, table.best, validate, decisions).diagnosis()
+        bare = Answer(table, table.best, validate).diagnosis()
         return replace(bare, verdict='unknown', warnings=(), depends_on=(),
                        effort_looks_like=other, stick_slip=sticking)
     table = tabulate(model, recordings, decisions, lambda share: report(0.9 * share),
                      None if reference is None else reference.carried_over)
     since = None if reference is None else SinceReference.of(reference, table.first.design)
-    found = replace(answer_of(table, validate, decisions), since=since)
+    found = replace(answer_of(table, validate), since=since)
     report(1.0)
     return found
 

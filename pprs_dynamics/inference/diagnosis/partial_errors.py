@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
 from pprs_dynamics.inference.residuals.profiles import Profile, bin_edges, bin_of, error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals

@@ -110,8 +110,8 @@ class FittedTerm:
 
 
 @dataclass(frozen=True)
-class ColumnPlan:
-    """Columns of which information is computed: base columns, then those of terms.
+class Information:
+    """Gram matrices (P, P) of columns: base columns, then those of terms.
 
     Parameters
     ----------
@@ -120,19 +120,22 @@ class ColumnPlan:
     base : tuple of BaseColumn
         Every base column that a motion may excite.
     terms : tuple of FittedTerm
+    noise : mapping of drive to NoiseSpectrum
+        Other drives give no information.
     """
 
     given: DriveModel
     model: DriveModel
     base: tuple[BaseColumn, ...]
     terms: tuple[FittedTerm, ...]
+    noise: Mapping[int, NoiseSpectrum]
 
     @classmethod
     def of(cls, given: DriveModel, model: DriveModel, forces: Forces, time: Array,
-           terms: Sequence[FittedTerm]) -> ColumnPlan:
-        """Return the plan of the base columns of any motion, with terms."""
-        return cls(given, model, cls(given, model, (), tuple(terms)).on_motion(forces, time).base,
-                   tuple(terms))
+           terms: Sequence[FittedTerm], noise: Mapping[int, NoiseSpectrum]) -> Information:
+        """Return the information of terms and of the base columns of any motion."""
+        found = cls(given, model, (), tuple(terms), noise)
+        return replace(found, base=found.on_motion(forces, time).base)
 
     @property
     def size(self) -> int:
@@ -142,7 +145,7 @@ class ColumnPlan:
     @property
     def numbers(self) -> tuple[int, ...]:
         """Places of the model's own numbers."""
-        return tuple(k for k, one in enumerate(self.base) if isinstance(one, ModelNumber))
+        return tuple(k for k, column in enumerate(self.base) if isinstance(column, ModelNumber))
 
     def places(self, terms: Sequence[FittedTerm], only_fitted: bool = True) -> tuple[int, ...]:
         """Return the places of the columns of terms that are fitted, or of their coefficients."""
@@ -182,6 +185,29 @@ class ColumnPlan:
         self._sensitivities.homing_stride = max(1, len(time) // HOMING_SAMPLES)
         return Design.planned(self._sensitivities, forces, time, block)
 
+    def prior(self) -> Array:
+        """Return what is known of the base columns beforehand."""
+        known = np.zeros(self.size)
+        known[:len(self.base)] = [column.precision for column in self.base]
+        return np.diag(known)
+
+    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
+        """Return the information of recordings and the prior of the base columns."""
+        gram = self.prior()
+        for d, rows in self.columns(design):
+            if d in self.noise:
+                series = regression.series[d]
+                white = series.transform(rows) * series.spread(
+                    np.sqrt(regression.weights(fit, d)))
+                gram += white @ white.T
+        return gram
+
+    def of_motion(self, design: Design, duration: float) -> Array:
+        """Return the information of a motion of some duration [s], at any sampling rate."""
+        white = [whitened(rows, self.noise[d], duration)
+                 for d, rows in self.columns(design) if d in self.noise]
+        return sum((rows @ rows.T for rows in white), np.zeros((self.size,) * 2))
+
     @cached_property
     def _sensitivities(self) -> Sensitivities:
         found = Sensitivities(self.model, self.given)
@@ -195,44 +221,6 @@ class ColumnPlan:
 def _key(column: BaseColumn) -> str:
     """Return what identifies a base column in any design."""
     return repr(replace(column, rows={}))
-
-
-@dataclass(frozen=True)
-class Information:
-    """Gram matrices of a plan's columns, (P, P).
-
-    Parameters
-    ----------
-    plan : ColumnPlan
-    noise : mapping of drive to NoiseSpectrum
-        Other drives give no information.
-    """
-
-    plan: ColumnPlan
-    noise: Mapping[int, NoiseSpectrum]
-
-    def prior(self) -> Array:
-        """Return what is known of the base columns beforehand."""
-        known = np.zeros(self.plan.size)
-        known[:len(self.plan.base)] = [column.precision for column in self.plan.base]
-        return np.diag(known)
-
-    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
-        """Return the information of recordings and the prior of the base columns."""
-        gram = self.prior()
-        for d, rows in self.plan.columns(design):
-            if d in self.noise:
-                series = regression.series[d]
-                white = series.transform(rows) * series.spread(
-                    np.sqrt(regression.weights(fit, d)))
-                gram += white @ white.T
-        return gram
-
-    def of_motion(self, design: Design, duration: float) -> Array:
-        """Return the information of a motion of some duration [s], at any sampling rate."""
-        white = [whitened(rows, self.noise[d], duration)
-                 for d, rows in self.plan.columns(design) if d in self.noise]
-        return sum((rows @ rows.T for rows in white), np.zeros((self.plan.size,) * 2))
 
 
 def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:

@@ -258,7 +258,7 @@ def design_experiment(question: Question, motions: Motions, seed: int,
         question.kind, tuple(dict.fromkeys(term.effect.name for terms in question.subjects
                                            for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
-        best.duration, lambda time: motions.sampled(best, time), question.plan.model, determined)
+        best.duration, lambda time: motions.sampled(best, time), question.information.model, determined)
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
@@ -295,16 +295,16 @@ def _accuracies(question: Question, after: Array) -> list[Accuracy]:
     """Return how well numbers and effects would be known; of common effects each alone."""
     if question.contests:
         return []
-    plan, groups = question.plan, list(question.subjects)
+    information, groups = question.information, list(question.subjects)
     if question.kind == ESTIMATE:
         groups = [tuple(term for terms in groups for term in terms)]
-    asked = [([label for term in terms for label in _labels(term, plan.model)],
-              precision_of(plan, terms)) for terms in groups]
+    asked = [([label for term in terms for label in _labels(term, information.model)],
+              precision_of(information, terms)) for terms in groups]
     if question.kind == COMMISSION:
         # Columns of the model's numbers are per standard deviation of what is known beforehand.
         asked.insert(0, ([(column.label, column.unit, column.deviation) for column in (
-            base.number for base in plan.base if isinstance(base, ModelNumber))],
-            precision_of(plan, (), plan.numbers)))
+            base.number for base in information.base if isinstance(base, ModelNumber))],
+            precision_of(information, (), information.numbers)))
     found = []
     for labels, precision in asked:
         before, later = (precision.deviations(gram) / precision.scales

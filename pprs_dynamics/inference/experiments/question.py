@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.experiments.information import (
-    ColumnPlan,
     Contest,
     FittedTerm,
     Information,
@@ -77,21 +76,16 @@ class Question:
     noise_floor: float
 
     @property
-    def plan(self) -> ColumnPlan:
-        """Columns of the information."""
-        return self.information.plan
-
-    @property
     def precision(self) -> Precision:
         """How well the effects in question are known, of a new robot with its model's numbers."""
-        return precision_of(self.plan, [term for subject in self.subjects for term in subject],
-                            self.plan.numbers if self.kind == COMMISSION else ())
+        return precision_of(self.information, [term for subject in self.subjects for term in subject],
+                            self.information.numbers if self.kind == COMMISSION else ())
 
     def gram(self, motions: Motions, series: JointSeries) -> Array:
         """Return the information of a motion, (P, P)."""
         time = coarse_time(series)
-        moved = replace(motions, model=self.plan.model).forces(series, time)
-        return self.information.of_motion(self.plan.on_motion(moved, time), series.duration)
+        moved = replace(motions, model=self.information.model).forces(series, time)
+        return self.information.of_motion(self.information.on_motion(moved, time), series.duration)
 
     def worth(self, gram: Array) -> float:
         """Return the value of a motion in addition to what is known."""
@@ -107,11 +101,11 @@ class Question:
         return replace(self, contests=hopeful) if hopeful else self
 
 
-def precision_of(plan: ColumnPlan, terms: Sequence[FittedTerm], numbers: tuple[int, ...] = (),
-                 ) -> Precision:
+def precision_of(information: Information, terms: Sequence[FittedTerm],
+                 numbers: tuple[int, ...] = ()) -> Precision:
     """Return how well the coefficients of terms and numbers of the model are known."""
-    return Precision((*numbers, *plan.places(terms)),
-                     tuple(k for k in range(len(plan.base)) if k not in numbers),
+    return Precision((*numbers, *information.places(terms)),
+                     tuple(k for k in range(len(information.base)) if k not in numbers),
                      np.concatenate([np.ones(len(numbers)), *(term.scales for term in terms)]))
 
 
@@ -151,16 +145,16 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     every = [*terms, *joined.values()]
     question = _asked(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, terms[:1],
                       every)
-    plan, contests = question.plan, []
+    information, contests = question.information, []
     for (refitted, true), more in joined.items():
-        free = plan.places((*terms[refitted], *more))
-        certain = plan.force(terms[refitted])
+        free = information.places((*terms[refitted], *more))
+        certain = information.force(terms[refitted])
         certain[list(free)] = 0.0
         rival = chosen[max(refitted, true) - 1]
         sides = ((rival.missing, rival.instead) if true == 0
                  else (rival.instead, rival.missing))
         contests.append(Contest(
-            *sides, plan.force(terms[true]) - certain, (*range(len(plan.base)), *free),
+            *sides, information.force(terms[true]) - certain, (*range(len(information.base)), *free),
             rows[refitted].cost - rows[true].cost))
     return replace(question, contests=tuple(contests))
 
@@ -211,11 +205,11 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
         regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
         return _asked(COMMISSION, design, regression, regression.fit(()), motions, subjects)
-    plan, series = _plan(model, model, motions, subjects), motions.drawn(0, 1)[0]
+    series = motions.drawn(0, 1)[0]
     largest = np.abs(motions.forces(series, coarse_time(series)).total).max(axis=0)
     levels = np.maximum(NOISE_SHARE * largest, 1e-9) if noise is None else np.full(
         len(largest), noise)
-    information = Information(plan, {
+    information = _information(model, model, motions, subjects, {
         d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
         for d, level in enumerate(levels)})
     return Question(COMMISSION, information, information.prior(), (), tuple(subjects),
@@ -251,16 +245,17 @@ def _asked(kind: str, design: Design, regression: Regression, fit: JointFit, mot
            subjects: Sequence[Sequence[FittedTerm]],
            every: Sequence[Sequence[FittedTerm]] = ()) -> Question:
     """Return a question after recordings, under the noise of a fit; `every`: all columns."""
-    information = Information(_plan(design.given, design.model, motions, every or subjects),
-                              regression.noise(fit))
+    information = _information(design.given, design.model, motions, every or subjects,
+                               regression.noise(fit))
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
     return Question(kind, information, information.of_recordings(design, regression, fit),
                     (), tuple(map(tuple, subjects)), floor)
 
 
-def _plan(given: DriveModel, model: DriveModel, motions: Motions,
-          subjects: Sequence[Sequence[FittedTerm]]) -> ColumnPlan:
+def _information(given: DriveModel, model: DriveModel, motions: Motions,
+                 subjects: Sequence[Sequence[FittedTerm]], noise: Mapping[int, NoiseSpectrum],
+                 ) -> Information:
     series = motions.drawn(0, 1)[0]
     time = coarse_time(series)
-    return ColumnPlan.of(given, model, replace(motions, model=model).forces(series, time), time,
-                         [term for terms in subjects for term in terms])
+    return Information.of(given, model, replace(motions, model=model).forces(series, time), time,
+                          [term for terms in subjects for term in terms], noise)

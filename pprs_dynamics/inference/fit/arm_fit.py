@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import rounded
 from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.residuals.reconstruction import (
@@ -27,16 +26,25 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.alike import alike_joints
-from pprs_dynamics.physics.mechanism.description import PARAMETERS
+from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    from_pseudo_inertia,
+    pseudo_inertia,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
 
+LEAST_MASS = 1e-3  # [kg]; links without mass are given this, and
+LEAST_RADIUS = 0.02  # [m] this radius: thin rods of a drawing have none across
+ROWS, COLUMNS = np.tril_indices(4)
 # Numbers of a joint beside those of its link, in this order.
-ARMATURE, VISCOUS, COULOMB, OFFSET = range(4)
-OF_JOINT = 4
+ARMATURE, OFFSET = 0, 3
+OWN = ('robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')
+OF_JOINT = len(OWN)
+REVERSAL_VELOCITIES = 'friction.reversal_velocities'
 # A link's pseudo-inertia is known to as much as itself: drawings often have bodies as points or
 # rods, yet not of ten times the mass.
 SPREAD = 1.0
@@ -47,6 +55,51 @@ WIDTHS = np.geomspace(0.1, 10.0, 13)  # times the model's width of reversal, tri
 ROUNDS = 3  # of weights and widths
 DETERMINED = 0.5  # of what was known before, that a determined number may still be uncertain by
 STANDS = 0.05  # share of the samples in which a joint must move for its friction to be fitted
+
+
+class Bodies:
+    """Links as points of a flat space, n times 10 numbers, 0 for the description.
+
+    Parameters
+    ----------
+    described : (n, 10) array
+        Inertial parameters of the description; see `Mechanism`.
+    """
+
+    def __init__(self, described: Array) -> None:
+        self.roots = np.stack([np.linalg.cholesky(_thick(pseudo_inertia(one)))
+                               for one in described])
+
+    def __len__(self) -> int:
+        return PARAMETERS * len(self.roots)
+
+    def inertial(self, point: Array) -> Array:
+        """Return the inertial parameters (n, 10) at a point (10 n,)."""
+        P = self.roots @ self._relative(point) @ self.roots.transpose(0, 2, 1)
+        return np.array([from_pseudo_inertia(one) for one in P])
+
+    def distance(self, point: Array) -> Array:
+        """Return the distance from the description, element by element, (16 n,)."""
+        return (self._relative(point) - np.eye(4)).ravel()
+
+    def _relative(self, point: Array) -> Array:
+        M = np.tile(np.eye(4), (len(self.roots), 1, 1))
+        M[:, ROWS, COLUMNS] += point.reshape(-1, PARAMETERS)
+        return M @ M.transpose(0, 2, 1)
+
+
+def _thick(P: Array) -> Array:
+    """Return a pseudo-inertia of a body with mass and extent."""
+    mass = max(float(P[3, 3]), LEAST_MASS)
+    centre = P[:3, 3] / mass
+    about = P[:3, :3] - mass * np.outer(centre, centre)
+    values, axes = np.linalg.eigh((about + about.T) / 2)
+    values = np.maximum(values, mass * LEAST_RADIUS ** 2)
+    thick = np.empty((4, 4))
+    thick[:3, :3] = axes @ np.diag(values) @ axes.T + mass * np.outer(centre, centre)
+    thick[:3, 3] = thick[3, :3] = mass * centre
+    thick[3, 3] = mass
+    return thick
 
 
 @dataclass(frozen=True)
@@ -111,9 +164,7 @@ def _treated(found: Reconstruction, columns: Callable[[Any], Array]) -> Array:
 
 def own_numbers(model: DriveModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
-    values = model.values
-    return np.column_stack([values[key] for key in (
-        'robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
+    return np.column_stack([model.values[key] for key in OWN])
 
 
 def columns_of(model: DriveModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
@@ -131,7 +182,8 @@ class ArmFit:
     determined, total : int
         Combinations of the links' inertial parameters that the motion determines, and all.
     std : dict of str to (n,) array
-        Of armature, viscous and dry friction, offset by key; infinite where not determined.
+        Of armature, viscous and dry friction, offset by key; infinite where not determined, and
+        of the width of reversal.
     weak_links : tuple of str
         Joints of whose link the mass stays what the description says.
     standing : tuple of str
@@ -180,25 +232,18 @@ def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
     names = np.array(model.drives)
     return ArmFit(
         _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
-        links, {'robot.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
-                'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
+        links, {**dict(zip(OWN, std, strict=True)), REVERSAL_VELOCITIES: np.full(count, np.inf)},
         tuple(np.array(model.robot.body_joints)[masses > DETERMINED].tolist()),
         tuple(names[~moving].tolist()))
 
 
 def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> DriveModel:
     """Return the model with fitted numbers, rounded as files have them."""
-    def numbers(values: Array) -> tuple[float, ...]:
-        return tuple(rounded(float(value)) for value in values)
-
-    values: dict[str, Any] = {
-        **model.values,
-        **{key: numbers(np.array(found)) for key, found in inertial_values(inertial).items()},
-        'robot.armature': numbers(own[:, ARMATURE]),
-        'friction.viscous': numbers(own[:, VISCOUS]),
-        'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
-        'friction.reversal_velocities': numbers(width)}
-    return DriveModel.from_parameters(values, model.source)
+    found = {**inertial_values(inertial), **dict(zip(OWN, own.T, strict=True)),
+             REVERSAL_VELOCITIES: width}
+    return DriveModel.from_parameters({**model.values, **{
+        key: tuple(rounded(float(value)) for value in np.array(numbers))
+        for key, numbers in found.items()}}, model.source)
 
 
 def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:

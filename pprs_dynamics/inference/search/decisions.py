@@ -67,9 +67,6 @@ class Decisions:
     # Periods of a line within the longest stretch, below which it is a drift. Slow noise has
     # bumps of one or two periods.
     line_periods: float = 3.0
-    # Share by which friction by load may differ from friction that does not follow it, up to
-    # which a warning asks for another load. Dry friction varies by as much along a guide.
-    one_load: float = 0.05
     # Share of the time in stick-slip, from which no other effect is claimed. A fifth of the
     # samples decides about any friction.
     stick_slip: float = 0.2
