@@ -258,7 +258,8 @@ def design_experiment(question: Question, motions: Motions, seed: int,
         question.kind, tuple(dict.fromkeys(term.effect.name for terms in question.subjects
                                            for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
-        best.duration, lambda time: motions.sampled(best, time), question.information.model, determined)
+        best.duration, lambda time: motions.sampled(best, time), question.information.model,
+        determined)
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:

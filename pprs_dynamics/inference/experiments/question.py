@@ -78,8 +78,9 @@ class Question:
     @property
     def precision(self) -> Precision:
         """How well the effects in question are known, of a new robot with its model's numbers."""
-        return precision_of(self.information, [term for subject in self.subjects for term in subject],
-                            self.information.numbers if self.kind == COMMISSION else ())
+        terms = [term for subject in self.subjects for term in subject]
+        numbers = self.information.numbers if self.kind == COMMISSION else ()
+        return precision_of(self.information, terms, numbers)
 
     def gram(self, motions: Motions, series: JointSeries) -> Array:
         """Return the information of a motion, (P, P)."""
@@ -154,8 +155,8 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
         sides = ((rival.missing, rival.instead) if true == 0
                  else (rival.instead, rival.missing))
         contests.append(Contest(
-            *sides, information.force(terms[true]) - certain, (*range(len(information.base)), *free),
-            rows[refitted].cost - rows[true].cost))
+            *sides, information.force(terms[true]) - certain,
+            (*range(len(information.base)), *free), rows[refitted].cost - rows[true].cost))
     return replace(question, contests=tuple(contests))
 
 
