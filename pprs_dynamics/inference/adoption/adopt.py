@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.fit_curve import (
-    CurveRequest,
     fit_curve,
     held_out_residuals,
     with_curve,
@@ -59,12 +58,8 @@ PUSHES = 0.1  # of the moving time, in which friction may give power back
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 
 
-class PlacementError(PprsError, ValueError):
-    """An effect that cannot act where it is requested."""
-
-
 def adopt(
-    model: DriveModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
+    model: DriveModel, request: EffectRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
@@ -76,7 +71,7 @@ def adopt(
     Parameters
     ----------
     model : DriveModel
-    request : EffectRequest or CurveRequest
+    request : EffectRequest
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -93,30 +88,27 @@ def adopt(
     Raises
     ------
     EffectRequestError
-        For an effect that cannot act in this robot, and for a curve since a reference.
-    CurveError
-        Where the recordings cannot give the curve.
+        For an effect that cannot act in this robot, for a curve since a reference, and where the
+        recordings cannot give the curve.
     PprsError
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    start, is_effect = model, isinstance(request, EffectRequest)
-    if isinstance(request, EffectRequest):
-        start = original(model)
-        request = request.placed(start)
-    elif reference is not None:
+    if request.variable and reference is not None:
         raise EffectRequestError(f'{request.name}: a curve contains the error of the reference, '
                                  'too; since a reference, request an effect')
-    if diagnosis is None or (diagnosis.selection is None and is_effect):
+    start = model if request.variable else original(model)
+    request = request.placed(start)
+    if diagnosis is None or not (diagnosis.selection or request.variable):
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSED * share),
                              reference=reference)
     case = _Case(model, recordings, validate, diagnosis, reference)
-    if isinstance(request, CurveRequest):
+    if request.variable:
         found = _with_curve(case, request, report)
     else:
         try:
             found = _with_effect(case, request)
-        except (ModelError, PlacementError) as error:
+        except (ModelError, EffectRequestError) as error:
             force = False
             found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
                 f'its fit gives no model: {error}',))
@@ -191,7 +183,7 @@ class _Case:
                f'the fall is {gain.certainty:.2g} standard errors, must be more than {asked:g}')
         return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
 
-    def adoption(self, request: EffectRequest | CurveRequest, after: DriveModel,
+    def adoption(self, request: EffectRequest, after: DriveModel,
                  residuals: Sequence[Residuals], held_out: Sequence[float],
                  gain: PredictiveGain | None, objections: tuple[str, ...], **details: Any,
                  ) -> Adoption:
@@ -199,7 +191,7 @@ class _Case:
 
         Parameters
         ----------
-        request : EffectRequest or CurveRequest
+        request : EffectRequest
         after : DriveModel
         residuals : (before, after)
             On the recordings.
@@ -237,7 +229,7 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
 
     Raises
     ------
-    ModelError, PlacementError
+    ModelError, EffectRequestError
         Where the effect gives no model.
     """
     table, name = case.diagnosis.selection, request.name
@@ -292,7 +284,7 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
 
     Raises
     ------
-    PlacementError
+    EffectRequestError
         Where the effect has no force in these recordings.
     """
     rows = [table.best, *(rival.row for rival in table.rivals(
@@ -318,7 +310,7 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
     if len(chosen) < len(request.drives or (None,)):
         standing = [name for name in request.drives or design.drives
                     if not design.moves(design.drives.index(name))]
-        raise PlacementError(f'{", ".join(standing)} hardly moved in the recordings' if standing
+        raise EffectRequestError(f'{", ".join(standing)} hardly moved in the recordings' if standing
                              else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
     return Row(*linearised(fits, fitted), 0.0)
@@ -437,7 +429,7 @@ def _of_friction(effect: FoundEffect, model: DriveModel, residuals: Residuals) -
 # A measured curve
 
 
-def _with_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:
+def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], None]) -> Adoption:
     """Return the undecided adoption of a measured curve."""
     model, drive = case.model, request.drive
     bare = without_curve(model, drive)

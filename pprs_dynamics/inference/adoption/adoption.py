@@ -14,7 +14,7 @@ from typing import Any
 
 from pprs_dynamics import __version__
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
+from pprs_dynamics.inference.adoption.fit_curve import FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
@@ -33,7 +33,7 @@ class Adoption:
 
     Parameters
     ----------
-    request : EffectRequest or CurveRequest
+    request : EffectRequest
     drives : tuple of str or None
         On which it was fitted.
     before, after : DriveModel
@@ -62,7 +62,7 @@ class Adoption:
         Why, in one sentence.
     """
 
-    request: EffectRequest | CurveRequest
+    request: EffectRequest
     drives: tuple[str, ...] | None
     before: DriveModel
     after: DriveModel

@@ -10,7 +10,7 @@ be, and weakly to their description: what the motion does not excite stays as it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -167,52 +167,35 @@ def own_numbers(model: DriveModel) -> Array:
     return np.column_stack([model.values[key] for key in OWN])
 
 
-def columns_of(model: DriveModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
-    """Return the columns of recordings."""
-    return [ArmColumns.of_motion(model, reconstruct(model, one)) for one in recordings]
-
-
 @dataclass(frozen=True)
-class ArmFit:
-    """Result of the fit of an arm.
+class FittedNumber:
+    """A number of the model, before and after, with its standard deviation."""
 
-    Parameters
-    ----------
-    model : DriveModel
-    determined, total : int
-        Combinations of the links' inertial parameters that the motion determines, and all.
-    std : dict of str to (n,) array
-        Of armature, viscous and dry friction, offset by key; infinite where not determined, and
-        of the width of reversal.
-    weak_links : tuple of str
-        Joints of whose link the mass stays what the description says.
-    standing : tuple of str
-        Joints that hardly move.
-    """
-
-    model: DriveModel
-    determined: int
-    total: int
-    std: dict[str, Array]
-    weak_links: tuple[str, ...]
-    standing: tuple[str, ...]
+    key: str
+    drive: str
+    before: float
+    after: float
+    std: float
+    unit: str
 
 
-def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
-    """Return the model fitted to recordings.
+Fitted = tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]
+"""The fitted model, its numbers, and what the motion does not determine, as sentences."""
 
-    Parameters
-    ----------
-    model : DriveModel
-        As described; its added effects stay as they are.
-    columns : sequence of ArmColumns
-        Of that model.
+
+def fit_arm(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
+    """Return the model fitted to recordings; its added effects are unchanged.
+
+    Of the numbers those of each joint; infinite deviations where the motion does not determine
+    them, and for widths of reversal.
     """
     count = len(model.drives)
+    columns = [ArmColumns.of_motion(model, reconstruct(model, recording))
+               for recording in recordings]
     bodies = Bodies(model.robot.inertial)
-    known = np.concatenate([np.isfinite(one.measured) for one in columns])
-    inertial = np.concatenate([one.inertial for one in columns])
-    rest = np.concatenate([one.measured - one.rest for one in columns])
+    known = np.isfinite(np.concatenate([part.measured for part in columns]))
+    inertial = np.concatenate([part.inertial for part in columns])
+    rest = np.concatenate([part.measured - part.rest for part in columns])
     width = model.reversal.widths(count).copy()
     start = own_numbers(model)
     own, point = start.copy(), np.zeros(len(bodies))
@@ -221,20 +204,61 @@ def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
         if number > 0:
             width = _widths(columns, rest - inertial @ bodies.inertial(point).ravel(), known, own,
                             width, moving)
-        joints = np.concatenate([one.of_joints(width) for one in columns])
+        joints = np.concatenate([part.of_joints(width) for part in columns])
         point, own, spread = _solved(bodies, inertial, joints, np.where(
             known & moving, rest, np.nan), start, point, own)
     links = len(bodies)
-    ratio = np.linalg.eigvalsh(spread[:links, :links]) / SPREAD ** 2
-    masses = np.sqrt(np.diag(spread)[9:links:PARAMETERS]) / SPREAD
     std = np.sqrt(np.diag(spread)[links:]).reshape(count, OF_JOINT).T
     std[:, ~moving] = np.inf
-    names = np.array(model.drives)
-    return ArmFit(
-        _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
-        links, {**dict(zip(OWN, std, strict=True)), REVERSAL_VELOCITIES: np.full(count, np.inf)},
-        tuple(np.array(model.robot.body_joints)[masses > DETERMINED].tolist()),
-        tuple(names[~moving].tolist()))
+    fitted = _with(model, bodies.inertial(point), own, width)
+    return fitted, _numbers(model, fitted, dict(zip(OWN, std, strict=True))), _notes(
+        model, fitted, spread[:links, :links] / SPREAD ** 2, ~moving)
+
+
+def _numbers(model: DriveModel, fitted: DriveModel, std: Mapping[str, Array],
+             ) -> tuple[FittedNumber, ...]:
+    """Return the fitted numbers of each joint; `std`: their standard deviations, by key."""
+    found = []
+    for key in (*OWN, REVERSAL_VELOCITIES):
+        units = [unit.strip() for unit in model.keys[key].unit.split(',')]
+        for k, drive in enumerate(model.drives):
+            before = model.values[key][k]
+            if key == REVERSAL_VELOCITIES:
+                before = before or model.values['friction.reversal_velocity']
+            found.append(FittedNumber(
+                key, drive, float(before), float(fitted.values[key][k]),
+                float(std[key][k]) if key in std else np.inf,
+                units[0] if model.units[k].turns else units[-1]))
+    return tuple(found)
+
+
+def _notes(model: DriveModel, fitted: DriveModel, links: Array, still: Array) -> tuple[str, ...]:
+    """Return what the motion determines.
+
+    Parameters
+    ----------
+    model, fitted : DriveModel
+    links : (10 n, 10 n) array
+        Covariance of the links' inertial parameters over that before the fit.
+    still : (n,) array
+        Joints that hardly move.
+    """
+    before, after = (float(np.sum(robot.masses)) for robot in (model.robot, fitted.robot))
+    determined = int(np.sum(np.linalg.eigvalsh(links) < DETERMINED ** 2))
+    weak = np.sqrt(np.diag(links)[9::PARAMETERS]) > DETERMINED
+    notes = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
+             f'the motion determines {determined} combinations of the {len(links)} inertial '
+             'parameters of the links; all others stay near those of the URDF']
+    if weak.any():
+        notes.append('it does not determine the masses of the links that '
+                     f'{", ".join(np.array(model.robot.body_joints)[weak])} move one by one')
+    if still.any():
+        notes.append(f'{", ".join(np.array(model.drives)[still])} hardly moves: its friction stays '
+                     'as it was')
+    if model.efforts_in_amperes:
+        notes.append('efforts are currents times robot.gain: a gain that is wrong by 1 % makes all '
+                     'numbers wrong by 1 %')
+    return tuple(notes)
 
 
 def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> DriveModel:

@@ -13,12 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import (
-    REVERSAL_VELOCITIES,
-    ArmFit,
-    columns_of,
-    fit_arm,
-)
+from pprs_dynamics.inference.fit.arm_fit import Fitted, FittedNumber, fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -45,18 +40,6 @@ PART_OF_IT = ('what was wrong with the robot in these runs is part of the model 
 
 class FitError(PprsError, ValueError):
     """A fit that has nothing to do."""
-
-
-@dataclass(frozen=True)
-class FittedNumber:
-    """A number of the model, before and after, with its standard deviation."""
-
-    key: str
-    drive: str
-    before: float
-    after: float
-    std: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -190,11 +173,9 @@ def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str
             for d, drive in enumerate(folds[0][0].drives) if np.isfinite(error[:, d]).any()}
 
 
-def _fitted(model: DriveModel, recordings: Sequence[Recording],
-            ) -> tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]:
+def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     if model.is_mechanism:
-        fit = fit_arm(model, columns_of(model, recordings))
-        return fit.model, _numbers(model, fit), _notes(model, fit)
+        return fit_arm(model, recordings)
     # As in a diagnosis without any effect: the tolerance is the prior, and the width in which
     # friction reverses is free.
     fits = FittedSets(Design.of(model, recordings), DECISIONS)
@@ -202,34 +183,3 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording],
     return fitted_model(fits, found), tuple(
         FittedNumber(number.label, '', number.before, number.after, number.std, number.unit)
         for number in calibrations(fits, found)), ()
-
-
-def _numbers(model: DriveModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
-    """Return the fitted numbers of each joint; those of links are in `_notes`."""
-    found = []
-    for key, deviations in fit.std.items():
-        units = [unit.strip() for unit in model.keys[key].unit.split(',')]
-        for k, drive in enumerate(model.drives):
-            before = model.values[key][k]
-            if key == REVERSAL_VELOCITIES:
-                before = before or model.values['friction.reversal_velocity']
-            found.append(FittedNumber(
-                key, drive, float(before), float(fit.model.values[key][k]), float(deviations[k]),
-                units[0] if model.units[k].turns else units[-1]))
-    return tuple(found)
-
-
-def _notes(model: DriveModel, fit: ArmFit) -> tuple[str, ...]:
-    before, after = (float(np.sum(robot.masses)) for robot in (model.robot, fit.model.robot))
-    notes = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
-             f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
-             'parameters of the links; all others stay near those of the URDF']
-    if fit.weak_links:
-        notes.append('it does not determine the masses of the links that '
-                     f'{", ".join(fit.weak_links)} move one by one')
-    if fit.standing:
-        notes.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
-    if model.efforts_in_amperes:
-        notes.append('efforts are currents times robot.gain: a gain that is wrong by 1 % makes all '
-                     'numbers wrong by 1 %')
-    return tuple(notes)
