@@ -196,7 +196,8 @@ class FeedforwardNode(ManagedNode):
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
         # Without a clock nothing can be said of a stamp, and a wait for it would not end.
-        self._watchdog.feed(request.end - (now or request.start))
+        self._watchdog.feed(
+            request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
             self._lag.add(max(0.0, _since(info['received_timestamp'])
@@ -324,8 +325,8 @@ class FeedforwardNode(ManagedNode):
         elif ended:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
         else:
-            reason = ('the clock has stood still' if clock_stands else 'no valid trajectory')
-            text = f'{reason} for {timeout:g} s: {done}'
+            text = ('ROS time does not advance' if clock_stands
+                    else f'no valid trajectory for {timeout:g} s') + f': {done}'
             self._status.report('STALE', 'STALE', text)
             self._log.warning('stale', text)
 

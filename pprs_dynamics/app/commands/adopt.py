@@ -25,9 +25,9 @@ EXAMPLE = 'pprs adopt stribeck_friction run.mcap --validate other.mcap --output 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     effect = parser.add_argument(
-        'effect', metavar='EFFECT', help='name of an effect, on the drives that the recordings '
-        'call for; or EFFECT:drive,drive; or measured_curve:DRIVE@VARIABLE for what no effect '
-        'explains')
+        'effect', metavar='EFFECT', help='name of an effect, placed on the drives where it '
+        'reduces the error most; EFFECT:drive,drive names the drives; '
+        'measured_curve:DRIVE@VARIABLE is a correction table for what no effect explains')
     effect.completer = lambda **_: catalogue()  # type: ignore[attr-defined]  # of argcomplete
     arguments.add_recordings(parser)
     arguments.add_as_it_is(parser)
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_reference(parser)
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
-                        help='adopt it in spite of objections; the history records them')
+                        help='adopt it although the check objects; the history records why')
     arguments.add_report(parser)
 
 

@@ -37,7 +37,8 @@ class UsageError(PprsError, ValueError):
 
 def add_details(parser: argparse.ArgumentParser) -> None:
     """Declare --details."""
-    parser.add_argument('--details', action='store_true', help='print everything')
+    parser.add_argument('--details', action='store_true',
+                        help='print all findings, tables and values')
 
 
 def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with all figures',
@@ -48,8 +49,8 @@ def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with a
 
 def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declare --topic."""
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, if a file '
-                        'has several')
+    parser.add_argument('--topic', metavar='NAME', help='topic of type sensor_msgs/JointState, '
+                        'if a bag has several')
 
 
 def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
@@ -62,22 +63,22 @@ def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> No
 
 def add_as_it_is(parser: argparse.ArgumentParser) -> None:
     """Declare --as-it-is."""
-    parser.add_argument('--as-it-is', action='store_true', help='take recordings as they are, '
-                        'whatever their units, signs and efforts look like')
+    parser.add_argument('--as-it-is', action='store_true',
+                        help='accept a recording whose units, signs or efforts look wrong')
 
 
 def add_validation(parser: argparse.ArgumentParser,
-                   what: str = 'held-out errors are taken on it') -> None:
+                   what: str = 'held-out errors are measured on it') -> None:
     """Declare --validate."""
     parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
-                        help=f'a recording that is never fitted: {what}; may be repeated')
+                        help=f'a recording that is not fitted: {what}; may be repeated')
 
 
 def add_reference(parser: argparse.ArgumentParser) -> None:
     """Declare --reference."""
     parser.add_argument('--reference', metavar='RECORDING', nargs='*',
-                        help='runs of a day on which the machine was correct (default: those in '
-                        'the model file); report what has changed since then')
+                        help='report what has changed since these recordings of the healthy '
+                        'machine (none named: those that the model file names)')
 
 
 def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:

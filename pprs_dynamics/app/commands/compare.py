@@ -21,9 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_as_it_is(parser)
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
-                        help='write measured effort, model, parts and residual as joint states')
-    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
-                        'errors on the same recordings')
+                        help='bag to write: measured effort, effort of the model, its parts and '
+                        'the residual, as sensor_msgs/JointState')
+    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file; its '
+                        'errors on the same recordings are printed too')
     arguments.add_report(parser)
 
 

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_recordings(parser)
     arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
-    arguments.add_model_output(parser, 'model file that is written')
+    arguments.add_model_output(parser, 'model file to write')
     arguments.add_details(parser)
     arguments.add_report(parser)
 

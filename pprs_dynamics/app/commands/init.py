@@ -29,18 +29,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('robot', metavar='ROBOT', help='URDF or MJCF')
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='what the robot did: joints and columns are called as in the first; '
-                        'files of one quantity each (q.csv tau.csv), or their folder, are one')
+                        help='recordings of this robot; the first gives the names of joints and '
+                        'columns; files of one quantity each (q.csv tau.csv), or their folder, '
+                        'count as one recording')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
     parser.add_argument('--base', metavar='LINK', default='', help='the link that does not move')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
-    parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
+    parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
     parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
-                        help='positions and efforts as they are read')
-    parser.add_argument('--overwrite', action='store_true', help='replace --output where it is')
+                        help='picture of positions and efforts as they are read')
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing model file')
 
 
 def run(options: argparse.Namespace) -> int:

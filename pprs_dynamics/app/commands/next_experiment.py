@@ -30,12 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_recordings(parser, required=False)
     add_as_it_is(parser)
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
-                        required=True, help='poses for play_trajectory; of an arm, positions, '
-                        'velocities and accelerations of its joints')
+                        required=True, help='file of the motion: poses for play_trajectory; for '
+                        'an arm, positions, velocities and accelerations of its joints')
     parser.add_argument('--purpose', choices=PURPOSES, default='separate',
-                        help='separate: the effects that the recordings leave open (default); '
-                        'commission: the first motion of a new robot')
-    parser.add_argument('--seed', type=seed, default=0, help='of the search (default 0)')
+                        help='separate: a motion that separates the effects which the '
+                        'recordings leave open (default); commission: the first motion of a new '
+                        'robot')
+    parser.add_argument('--seed', metavar='N', type=seed, default=0,
+                        help='seed of the search (default 0)')
     add_report(parser)
 
 

@@ -44,7 +44,7 @@ PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
 
 @dataclass(frozen=True)
 class Localisation:
-    """Where the error lies, and the noise beside that.
+    """Where the error lies, and the noise of the drives.
 
     Parameters
     ----------

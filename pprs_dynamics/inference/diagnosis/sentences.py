@@ -47,6 +47,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFri
 MOST_CHANGED = 4  # values of an effect of the input model that a sentence compares
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 LEAST_TERM = 0.05  # of a cost, that one digit shows
+WHOLE = 20  # difference of costs from which it is rounded to a whole number
 VAGUE = 0.1  # relative uncertainty of a mass, beyond which its first moment is given if surer
 MOSTLY = 0.95  # of a recording, from which on a reference covers its states
 # Ratio of speeds beyond which lags depend on the speed: at half the speed a real arm shows delays
@@ -205,20 +206,23 @@ def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the best sets of effects in words, each with its cost above the best, and terms."""
-    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
+    return [(_set(diagnosis, fitted), _rise(fitted.cost) if number else 'the best',
              word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
 
 
 def word_terms(terms: CostTerms) -> str:
     """Return the visible terms of a difference of costs."""
-    return ', '.join(f'{name} {value:+.1f}' for name, value in terms.to_dict().items()
+    return ', '.join(f'{name} {_rise(value)}' for name, value in terms.to_dict().items()
                      if abs(value) >= LEAST_TERM)
 
 
+def _rise(cost: float) -> str:
+    """Return a difference of costs with its sign: a tenth matters where it is small."""
+    return f'{cost:+.1f}' if abs(cost) < WHOLE else f'{cost:+.0f}'
+
+
 def _cost(ranked: RankedSet) -> str:
-    why = word_terms(ranked.terms)
-    return (f'costs {abs(ranked.cost):.1f} {"less" if ranked.cost < 0 else "more"}'
-            + (f': {why}' if why else ''))
+    return f'costs {_rise(ranked.cost)[1:]} {"less" if ranked.cost < 0 else "more"}'
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
@@ -229,7 +233,8 @@ def runner_up(diagnosis: Diagnosis) -> str:
     best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
     others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
     others.sort(key=lambda ranked: best <= set(ranked.names))
-    return f'{_set(diagnosis, others[0])}: {_cost(others[0])}' if others else ''
+    return (f'{_set(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
+            if others else '')
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:

@@ -286,7 +286,7 @@ class Precision:
     scales: Array
 
     def own(self, gram: Array) -> Array:
-        """Return the information beside what the others explain, per scale, (k, k)."""
+        """Return the information that the others do not explain, per scale, (k, k)."""
         I, R = list(self.index), list(self.others)  # noqa: E741
         S = gram[np.ix_(I, I)]
         if R:
