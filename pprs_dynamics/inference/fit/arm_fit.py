@@ -67,8 +67,8 @@ class Bodies:
     """
 
     def __init__(self, described: Array) -> None:
-        self.roots = np.stack([np.linalg.cholesky(_thick(pseudo_inertia(one)))
-                               for one in described])
+        self.roots = np.stack([np.linalg.cholesky(_thick(pseudo_inertia(body)))
+                               for body in described])
 
     def __len__(self) -> int:
         return PARAMETERS * len(self.roots)
@@ -76,7 +76,7 @@ class Bodies:
     def inertial(self, point: Array) -> Array:
         """Return the inertial parameters (n, 10) at a point (10 n,)."""
         P = self.roots @ self._relative(point) @ self.roots.transpose(0, 2, 1)
-        return np.array([from_pseudo_inertia(one) for one in P])
+        return np.array([from_pseudo_inertia(body) for body in P])
 
     def distance(self, point: Array) -> Array:
         """Return the distance from the description, element by element, (16 n,)."""
@@ -278,7 +278,7 @@ def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
     if not model.robot.structure.loops:
         return ()
     others = {name for group in alike_joints(model.robot) for name in group[1:]}
-    return tuple(one for one in model.robot.passive_joints if one.name not in others)
+    return tuple(joint for joint in model.robot.passive_joints if joint.name not in others)
 
 
 def of_passive(model: DriveModel, motion: JointMotion) -> Array:
@@ -429,9 +429,9 @@ def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array
     from scipy.optimize import lsq_linear  # here: commands start without it
 
     tried = [np.clip(width * factor, 1e-6, None) for factor in WIDTHS]
-    turning = [np.concatenate([one.turning(each) for one in columns]) for each in tried]
+    turning = [np.concatenate([part.turning(widths) for part in columns]) for widths in tried]
     found = width.copy()
-    motion = np.concatenate([one.motion for one in columns])
+    motion = np.concatenate([part.motion for part in columns])
     for j in np.flatnonzero(moving):
         at = known[:, j]
         y = rest[at, j] - motion[at, j, 0] * own[j, ARMATURE]
