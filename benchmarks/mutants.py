@@ -42,13 +42,14 @@ CHEAP = ('LShift', 'RShift', 'BitAnd', 'BitOr', 'BitXor', '_Invert', 'USub_Not',
 # No module of these is imported by pytest before a test asks for it.
 UNCOMPILED = "import sys\nsys.modules['numba'] = None\n"
 
-SEARCH = ('inference/test_invariants_of_diagnosis.py', 'inference/test_search.py')
+SEARCH = ('inference/test_hypothesis_space.py', 'inference/test_invariants_of_diagnosis.py')
+ENGINES = ('physics/test_dynamics.py', 'physics/test_physics_engines.py')
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
 TESTS = {
-    'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
-    'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
-    'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
-    'physics/three_pprs/passive_friction.py': ('physics/test_dynamics.py',),
+    'physics/three_pprs/inverse_kinematics.py': ENGINES,
+    'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', *ENGINES),
+    'physics/three_pprs/rigid_body.py': ENGINES,
+    'physics/three_pprs/passive_friction.py': ENGINES,
     'physics/effects/foreign_effects.py': ('physics/test_foreign_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
@@ -58,11 +59,10 @@ TESTS = {
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
     'inference/search/search.py': SEARCH,
     'inference/search/fitted_sets.py': SEARCH,
-    'inference/search/table.py': ('inference/test_hypothesis_space.py', *SEARCH,
-                                  'inference/test_model_table.py'),
+    'inference/search/table.py': SEARCH,
     'inference/search/candidates.py': (*SEARCH, 'inference/test_prior_costs.py'),
     'inference/search/held_out.py': ('inference/test_gates.py', *SEARCH),
-    'inference/search/form_error.py': ('inference/test_gates.py', 'inference/test_search.py'),
+    'inference/search/form_error.py': SEARCH,
     'ros/force_command.py': ('ros/test_force_command.py',),
     'ros/messages/measured_states.py': ('ros/test_measured_states.py',),
     'ros/messages/trajectory_request.py': ('ros/test_trajectory_requests.py',

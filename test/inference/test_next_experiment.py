@@ -153,9 +153,6 @@ def test_white_noise_counts_samples() -> None:
     assert np.sum(whitened(wave, noise, 10.0) ** 2) == pytest.approx(2000)
 
 
-# Criteria.
-
-
 # Limits and search.
 
 
@@ -198,6 +195,3 @@ def test_no_room_is_said(model: DriveModel) -> None:
 def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
     with pytest.raises(PurposeError, match='no recording is given'):
         next_experiment(model)
-
-
-# The command.
