@@ -68,7 +68,7 @@ def statement(drive: str = 'slide_1', variable: str = 'position', kind: str = 'r
               limits: tuple[float, float] | None = (0.01, 0.02)) -> Statement:
     """Return what remains somewhere."""
     return Statement(drive, variable, limits, 0.41, 0.07, f'{drive}: 41% of its squared error lies '
-                     'somewhere, in 7% of the time; it is shifted there by +0.3 N', 77.0, kind, 0.3,
+                     'somewhere, in 7% of the time; it is shifted there by +0.3 N', 77.0, kind,
                      0.3 ** 2 * 0.07)
 
 

@@ -291,7 +291,7 @@ class Answer:
                     f'{drive}: its error changes from {begin:.4g} s to {end:.4g} s alone, by '
                     f'{plain(size)} {residuals.units_of(drive).effort} rms, as of a contact, a '
                     f'stop or a hand ({candidate.name} explains it): it is no property of the '
-                    'machine', evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
+                    'machine', evidence, 'range', float(np.mean(force[:, d] ** 2)))
 
     def _evidence(self, candidate: EffectCandidate | UnknownCandidate) -> float:
         """Return by how much the set of the row costs more without a candidate."""
