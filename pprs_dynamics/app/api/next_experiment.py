@@ -19,6 +19,14 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.experiment_report import (
+    drive_rows,
+    experiment_page,
+    experiment_view,
+    platform_rows,
+)
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_over_time
 from pprs_dynamics.inference.experiments.motion_design import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
@@ -27,7 +35,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 
@@ -75,14 +83,10 @@ class ExperimentResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.experiment_report import experiment_view
-
         return experiment_view(self.design)
 
     def page(self) -> Page:
         """Return a page: expected evidence, curves, and use of the limits."""
-        from pprs_dynamics.app.report.experiment_report import experiment_page
-
         return experiment_page(self.design, self.motion)
 
     def table(self) -> DataFrame:
@@ -91,16 +95,10 @@ class ExperimentResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
-        from pprs_dynamics.app.report.pictures import plot_over_time
-
         motion = self.motion
         assert motion.time is not None
-        if isinstance(motion, JointMotion):
-            return plot_over_time(motion.time, {
-                'position': dict(zip(self.inputs.model.drives, motion.position.T, strict=True))})
-        return plot_over_time(motion.time, {
-            'position [m]': dict(zip('xyz', motion.position.T, strict=True)),
-            'velocity [m/s]': dict(zip('xyz', motion.linear_velocity.T, strict=True))})
+        return plot_over_time(motion.time, drive_rows(self.design, motion) if isinstance(
+            motion, JointMotion) else platform_rows(motion))
 
 
 def next_experiment(

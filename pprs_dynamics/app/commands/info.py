@@ -17,7 +17,7 @@ from pprs_dynamics.app.report.mechanism_description import (
     describe_mechanism,
     mechanism_lines,
 )
-from pprs_dynamics.app.report.tables import reading_table, recording_page, recording_table
+from pprs_dynamics.app.report.tables import reading_table, recording_page
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
@@ -68,15 +68,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, screen: Any,
-                    by_column: bool = False) -> tuple[list[Recording], list[Summary]]:
-    """Print recordings by drive or by column, and their faults, and return both."""
+                    ) -> tuple[list[Recording], list[Summary]]:
+    """Print how the columns of recordings are read, and their faults, and return both."""
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, topic, progress) for path in paths]
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
-        for table in ([reading_table(summary, model.recorded)] if by_column
-                      else recording_table(summary, model.units)):
-            screen.print(table)
+        screen.print(reading_table(summary, model.recorded))
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
         others = [finding for finding in summary.findings if isinstance(finding, OtherReading)]

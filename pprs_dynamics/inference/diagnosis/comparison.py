@@ -314,25 +314,26 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The numbers over all drives in words."""
+        """The numbers over all drives, in at most two sentences."""
         share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
         little = f'{word_little(self.little)}; ' if self.little else ''
         error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
+        error = error[:1].upper() + error[1:]
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
         known = [drive for drive in beyond if drive.noise_floor is not None]
         if self.relative < DECISIONS.negligible:
-            return f'{error}: negligible'
+            return f'{error}, which is negligible.'
         if not beyond:
             placed = sorted({place.drive for place in self.where})
-            return f'{error}, all of it noise' + (f' except on {listed(placed)}' if placed else '')
+            return f'{error}. It is noise{f", except on {listed(placed)}" if placed else ""}.'
         worst = (max(known, key=lambda drive: drive.unexplained) if known else
                  max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300)))
         where = 'every drive' if len(beyond) == len(self.drives) > 1 else listed(
             [drive.drive for drive in beyond])
-        what = 'more than noise' if known else 'the noise is not known'
-        unexplained = ' unexplained' if known else ''
-        return (f'{error}; {what} on {where}. Worst is {worst.drive}, '
-                f'{in_unit(worst.unexplained, worst.unit)}{unexplained} ({worst.grade})')
+        what = 'it is more than noise' if known else 'the noise is not known'
+        worst_is = f'; the worst is {worst.drive} with ' if len(beyond) > 1 else ': '
+        return (f'{error}. On {where} {what}{worst_is}{in_unit(worst.unexplained, worst.unit)}'
+                f'{" unexplained" if known else ""} ({worst.grade}).')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
