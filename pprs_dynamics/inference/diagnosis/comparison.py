@@ -138,25 +138,11 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
     if not scored or scored[0][0] <= 0:
         return None
     evidence, winner, found = scored[0]
-    if _is_friction(winner, drive_patterns):
-        # What follows the sign of all but the slowest motion is the direction's.
-        evidence, winner, found = next((entry for entry in scored if (
-            entry[1].pattern.kind == 'friction' and entry[0] > 0)), scored[0])
     margin = drive_patterns.prior_costs.decisions.rival_margin
     kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
     other_variables = [rival.family.variable for score, rival, _ in scored
                        if score > evidence - margin and rival.family.variable not in kin]
     return winner, found, evidence, tuple(dict.fromkeys(other_variables))
-
-
-def _is_friction(winner: UnknownCandidate, drive_patterns: DrivePatterns) -> bool:
-    if winner.family.variable != 'velocity' or winner.pattern.kind != 'directed_range':
-        return False
-    speed = np.abs(drive_patterns.values('velocity'))
-    assert winner.pattern.limits is not None
-    low, high = winner.pattern.limits
-    return high >= speed.max() and bool(
-        np.mean(speed < low) <= drive_patterns.prior_costs.decisions.reversal_share)
 
 
 def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Block]:

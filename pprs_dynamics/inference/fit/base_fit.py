@@ -153,16 +153,12 @@ def require_open_numbers(model: DriveModel) -> None:
 
 def halves(recording: Recording) -> list[Recording]:
     """Return the first and the second half of a recording."""
-    parts = recording.segments
-    middle = sum(part.stop - part.start for part in parts) // 2
-    first, second, done = [], [], 0
-    for part in parts:
-        cut = min(max(part.start + middle - done, part.start), part.stop)
-        first.append(slice(part.start, cut))
-        second.append(slice(cut, part.stop))
-        done += part.stop - part.start
-    return [replace(recording, segments=tuple(part for part in found if part.stop > part.start))
-            for found in (first, second)]
+    start, end = recording.segments[0].start, recording.segments[-1].stop
+    middle = (start + end) // 2
+    return [replace(recording, segments=tuple(
+        slice(max(part.start, low), min(part.stop, high)) for part in recording.segments
+        if max(part.start, low) < min(part.stop, high)))
+        for low, high in ((start, middle), (middle, end))]
 
 
 def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str, float]:

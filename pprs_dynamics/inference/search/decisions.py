@@ -70,9 +70,6 @@ class Decisions:
     # Share of the time in stick-slip, from which no other effect is claimed. A fifth of the
     # samples decides about any friction.
     stick_slip: float = 0.2
-    # Share of the samples, the slowest, that a pattern of friction may leave out. Friction turns
-    # over there, in a width that nobody knows.
-    reversal_share: float = 0.12
     # Share of a drive's squared error that a statement of compare must explain. A tenth of the
     # rms; less is no news.
     statement_share: float = 0.01
