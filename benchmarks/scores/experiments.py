@@ -44,7 +44,7 @@ from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Moti
 from pprs_dynamics.inference.experiments.next_experiment import design_experiment
 from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
 from pprs_dynamics.simulation.sensors import SensorSettings

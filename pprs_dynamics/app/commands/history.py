@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import add_model_output, add_report
+from pprs_dynamics.app.commands.arguments import add_shared
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='undo the last step')
-    add_model_output(parser, 'model file that --undo writes', required=False)
-    add_report(parser, 'draw the falling error as a page')
+    add_shared(parser, 'output', 'report', required=False, output='model file that --undo writes',
+               report='write a page that shows how the error fell')
 
 
 def run(options: argparse.Namespace) -> int:

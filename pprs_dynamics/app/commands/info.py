@@ -11,7 +11,7 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
-from pprs_dynamics.app.commands.arguments import UsageError, add_recordings, add_report
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import (
     describe_mechanism,
@@ -34,8 +34,8 @@ EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser, required=False)
-    add_report(parser, 'draw positions and efforts over time')
+    add_shared(parser, 'recordings', 'topic', 'report', required=False,
+               report='write a page with positions and efforts over time')
 
 
 def run(options: argparse.Namespace) -> int:
