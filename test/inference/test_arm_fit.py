@@ -162,17 +162,6 @@ def test_a_reversal_is_no_rest() -> None:
     assert not find_rests(0.3 * np.sin(0.8 * time)[:, None], 0.01, 0.01).any()
 
 
-def test_a_hidden_payload_is_named_alone_and_its_mass_is_right(tmp_path: Path) -> None:
-    given = arm.real_arm(tmp_path)
-    loaded = DriveModel.from_parameters({**given.values, 'effects.active': ['payload_mass'],
-                          'effects.payload_mass.mass': 1.2}, given.source)
-    found = diagnose(given, [arm.record(loaded, arm.motion(), NOISE)])
-    assert [one.name for one in found.effects] == ['payload_mass']
-    mass = found.effects[0].parameters['mass']
-    assert mass.value == pytest.approx(1.2, abs=3 * mass.std)
-    assert mass.unit == 'kg'
-
-
 def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:

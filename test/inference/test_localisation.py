@@ -78,14 +78,3 @@ def test_missing_samples_and_segments_do_not_hide_an_error_nor_make_one() -> Non
     measured[:, 2] += 0.4 * (load - load.min()) / np.ptp(load)
     first = localise(replace(holed, measured=measured)).statements[0]
     assert (first.drive, first.variable) == ('slide_3', 'load')
-
-
-def test_one_drive_and_few_variables_are_enough() -> None:
-    rng = np.random.default_rng(6)
-    t = 0.01 * np.arange(3000)
-    x, v = 0.1 * np.sin(0.9 * t), 0.09 * np.cos(0.9 * t)
-    measured = 0.05 * rng.normal(size=(3000, 1)) + 0.2 * np.sign(v)[:, None]
-    axis = Residuals(('axis',), t, np.zeros(3000, dtype=int), measured, np.zeros((3000, 1)), {},
-                     {'position': x[:, None], 'velocity': v[:, None]}, 0.01)
-    first = localise(axis).statements[0]
-    assert (first.drive, first.variable) == ('axis', 'direction')
