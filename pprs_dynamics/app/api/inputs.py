@@ -26,7 +26,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
+    from pprs_dynamics.inference.adoption.adoption import LedgerBook
     from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
     from pprs_dynamics.inference.fit.reference import Reference
 
@@ -254,7 +254,7 @@ class Inputs:
     @property
     def ledger(self) -> LedgerBook:
         """What enters adoptions on these recordings into a model's ledger."""
-        from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+        from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
             return tuple(RecordingEntry.of(recording, name if name in self.paths else None)
