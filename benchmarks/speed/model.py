@@ -29,7 +29,6 @@ from benchmarks.speed.peers import MujocoPeer, PinocchioPeer
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
-from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, forces_kernel
 
@@ -48,7 +47,7 @@ def main(rounds: int) -> None:
     for peer in peers:
         gap = np.abs(peer.many(motion) - forces.parts['rigid_body']).max()
         assert gap < AGREEMENT, f'{peer.name} is {gap} N off'
-    print(f'model compiled: {is_compiled()}; {rounds} rounds; peers agree within {AGREEMENT:g} N')
+    print(f'{rounds} rounds; peers agree within {AGREEMENT:g} N')
     one_sample(model, peers, motion, rounds)
     batches(model, peers, motion, rounds)
     growth(model, motion)
@@ -161,9 +160,7 @@ def start() -> None:
                   'DriveModel.load().drive_forces(PlatformMotion.at_rest((0, 0, 0.5)))')
     for name, code in (('python alone', 'pass'), ('import numpy', 'import numpy'),
                        ('import pprs_dynamics', 'import pprs_dynamics'),
-                       ('first evaluation, caches warm', evaluation),
-                       ('first evaluation, not compiled',
-                        f'import os; os.environ[{PLAIN!r}] = "1"; {evaluation}')):
+                       ('first evaluation, caches warm', evaluation)):
         elapsed, used = np.inf, np.inf
         for _ in range(5):
             begin, before = time.perf_counter(), _processor_of_children()

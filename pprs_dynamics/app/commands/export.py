@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     model = DriveModel.load(options.file)
     expressed = express(model, options.to)
-    robot = export_robot(expressed, options.to)
+    robot = export_robot(expressed)
     text = written(robot, options.to)
     found = replay(model, robot, text, options.to)
     write_text(options.output, text)

@@ -16,8 +16,8 @@ from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.pictures import plot_over_time, save
+from pprs_dynamics.app.report.tables import recording_rows
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
-from pprs_dynamics.drives import common_unit
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -64,13 +64,10 @@ def run(options: argparse.Namespace) -> int:
             screen.print(f'  {shown(line)}')
         return 1
     recordings, summaries = show_recordings(first.model, list(map(str, first.recordings)), None,
-                                            screen, by_column=True)
+                                            screen)
     if options.picture and recordings:
-        save(plot_over_time(recordings[0].time, {
-            f'{what} [{common_unit(first.model.units, unit)}]': dict(
-                zip(first.model.drives, values.T, strict=True))
-            for what, unit, values in (('position', 'm', recordings[0].position),
-                                       ('effort', 'N', recordings[0].effort))}), options.picture)
+        save(plot_over_time(recordings[0].time, recording_rows(
+            recordings[0], first.model.units)), options.picture)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)

@@ -100,9 +100,6 @@ def _ended(given: Sequence[str]) -> int:
         options.words = given  # for the record of a page
         is_assumed = _choose_model(options)
         check_files(options)
-        from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
-
-        postpone_compiling()
         status: int = _module(options.command).run(options)
         if is_assumed:
             print(NO_MODEL)

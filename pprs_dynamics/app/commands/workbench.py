@@ -15,9 +15,7 @@ from typing import Any
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
-    add_reference,
-    add_topic,
-    add_validation,
+    add_shared,
     whole,
 )
 from pprs_dynamics.app.workbench.errors import SessionError
@@ -41,9 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
                         help='bag or table, as for all commands; or a folder of them, to choose '
                         'from in the browser; or one saved session.json')
-    add_validation(parser, 'adoptions are judged on it')
-    add_reference(parser)
-    add_topic(parser)
+    add_shared(parser, 'validate', 'reference', 'topic', validate='a recording that is not fitted: '
+               'adoptions are judged on it; may be repeated')
     parser.add_argument('--live', action='store_true',
                         help='subscribe to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,

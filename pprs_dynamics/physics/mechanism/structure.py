@@ -24,7 +24,7 @@ from pprs_dynamics.physics.mechanism.closures import (
     Closing,
     Mobility,
     with_actuated_coordinates,
-    with_elimination_order,
+    with_determined_coordinates,
 )
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
@@ -331,7 +331,6 @@ class _Builder:
                 placed, pairwise(starts), strict=True)]).reshape(-1, 4),
             rows=_integers([(k, row[0], *row[1]) for k, row in rows]).reshape(-1, 6),
             path=_integers([*zip(joints, signs, strict=True)]).reshape(-1, 2),
-            starts=np.zeros((1, 3), dtype=np.int64), swap=none, below=none, right=none,
             frames=_vectors(each for frame, axis in zip(self.place, self.axis, strict=True)
                             for each in (*frame.R, frame.p, axis)),
             ratio=np.array(self.ratio), offset=np.array(self.offset),
@@ -418,7 +417,7 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
     units = np.where(build.slides, size, 1.0)
-    return replace(structure, mobility=mobility, tables=with_elimination_order(
+    return replace(structure, mobility=mobility, tables=with_determined_coordinates(
         t, mobility.rows, mobility.passive, units, q))
 
 

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.mechanism.closures import (
     RANK,
     ROWS,
     with_actuated_coordinates,
-    with_elimination_order,
+    with_determined_coordinates,
 )
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -231,5 +231,6 @@ def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chos
         stride=strides[chosen], **{name: np.concatenate((getattr(t, name), values))
                                    for name, values in added.items()}), count + chosen, count + 6)
     rows = np.array([*range(len(t.passive)), *range(len(t.rows), len(tied.rows))])
-    return with_elimination_order(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
-                                  np.append(every, units), np.append(structure.home, np.zeros(6)))
+    return with_determined_coordinates(
+        tied, rows, np.concatenate((t.passive, t.drives, count + left)),
+        np.append(every, units), np.append(structure.home, np.zeros(6)))
