@@ -33,6 +33,7 @@ HIDDEN: dict[str, Effects] = {
     'spring': {'drive_spring': {'stiffness': 60.0, 'position': 0.02}},
     'inertia': {'drive_inertia': {'mass': 2.0}}, 'offset': {'effort_offset': {'force': 0.8}},
     'gain': {'effort_gain': {'gain': 0.1}}, 'delay': {'time_delay': {'delay': 0.0173}},
+    'friction': {'coulomb_friction': {'force': 1.2}, 'viscous_friction': {'coefficient': 12.0}},
     'two': {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}}
 SOMETHING = [name for name in HIDDEN if name != 'nothing']
 DRY = axis(HIDDEN['dry'])

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
-from pprs_dynamics.inference.fit.base_fit import Refit, refit_base, require_open_numbers
+from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base, require_open_numbers
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -119,19 +119,19 @@ class AdoptionRunResult(Result):
         Model and recordings.
     run : AdoptionRun
         What was adopted and refused, one after the other.
-    refit : Refit, optional
+    refit : BaseFit, optional
         Of the base model with the adopted effects.
     """
 
     inputs: Inputs
     run: AdoptionRun
-    refit: Refit | None = None
+    refit: BaseFit | None = None
 
     @property
     def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
-        if self.refit is not None and self.refit.taken:
-            return self.refit.fit.model
+        if self.refit is not None and self.refit.ratio < 1:
+            return self.refit.model
         return self.run.model
 
     @property
@@ -155,12 +155,14 @@ class AdoptionRunResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        refit = {} if self.refit is None else {'refit': self.refit.to_dict()}
+        refit = {} if self.refit is None else {'refit': {
+            **self.refit.to_dict(), 'taken': self.refit.ratio < 1, 'reason': self.refit.change}}
         return {**self.run.to_dict(), **refit}
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        return run_view(self.run, details)
+        return run_view(self.run, self.inputs.files.command(
+            'next-experiment', '--output', 'next.csv'), details)
 
     def page(self) -> Page:
         """Return the page of `pprs history --report` of the model."""
@@ -269,7 +271,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
         None if diagnosis is None else diagnosis.diagnosis, inputs.reference)
     if not again or not run.adopted:
         return AdoptionRunResult(inputs, run)
-    return AdoptionRunResult(inputs, run, refit_base(
+    return AdoptionRunResult(inputs, run, fit_base(
         run.model, again, inputs.held_out, stage(progress, 'fitting the base')))
 
 

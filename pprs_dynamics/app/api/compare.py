@@ -16,9 +16,8 @@ from pprs_dynamics.app.report.comparison_report import comparison_page, comparis
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
-from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements

@@ -23,8 +23,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals

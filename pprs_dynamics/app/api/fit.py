@@ -71,7 +71,7 @@ class FitResult(Result):
 
     def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([number.to_dict() for number in self.fit.numbers])
+        return data_frame([vars(number) for number in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.app.api.inputs import (
-    InputError,
     Inputs,
     Model,
     Progress,
@@ -28,7 +27,7 @@ from pprs_dynamics.app.report.experiment_report import (
 )
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_over_time
-from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
+from pprs_dynamics.inference.experiments.motion_design import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -104,8 +103,8 @@ class ExperimentResult(Result):
 
 def next_experiment(
     model: Model, recordings: Recordings = (), *, purpose: str = 'separate',
-    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
-    noise: float = 0.05, rate: float = RATE, topic: str | None = None,
+    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float | None = None, rate: float = RATE, topic: str | None = None,
     progress: Progress | None = None,
 ) -> ExperimentResult:
     """Design the motion that best separates the remaining candidates.
@@ -116,15 +115,15 @@ def next_experiment(
     recordings : path, Recording, or a sequence of them
     purpose : {'separate', 'commission'}
         What the recordings leave open; or a first motion of a new robot, without recordings.
-    limits : MotionLimits or ArmLimits, optional
+    limits : MotionLimits, optional
         In addition to those of the model file or the URDF.
     duration : float
         [s]
     seed : int
         Of the search.
-    noise : float
-        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
-        recordings.
+    noise : float, optional
+        Standard deviation of means of the effort over 0.01 s [N, N m], for 'commission' without
+        recordings; by default 1 % of each drive's largest effort.
     rate : float
         Of the samples [Hz].
     topic, progress : optional
@@ -145,13 +144,8 @@ def next_experiment(
     """
     inputs = Inputs.of(model, recordings, (), topic, progress)
     check_purpose(purpose, inputs.fitted)
-    found = inputs.model
-    share_done = stage(progress, 'designing')
-    kind = ArmLimits if found.moves_joints else MotionLimits
-    if limits is not None and not isinstance(limits, kind):
-        raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
-                         f'{found.title}')
-    designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise, share_done)
+    designed = design(inputs.model, inputs.fitted, purpose, limits, duration, seed, noise,
+                      stage(progress, 'designing'))
     count = int(duration * rate + 1e-9) + 1
     return ExperimentResult(inputs, designed, designed.motion(np.arange(count) / rate), purpose,
                             seed, rate)

@@ -64,7 +64,7 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
     if count or not result.refused:
         result.save(options.output)
         if result.refit is not None:
-            screen.print(result.refit.reason)
+            screen.print(result.refit.change)
         screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
 

@@ -21,8 +21,7 @@ from pprs_dynamics.app.report.terminal import (
     verdict_panel,
 )
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RivalEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
@@ -135,8 +134,8 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
     if diagnosis.candidates:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
-                [(candidate.name, f'{candidate.evidence:.0f}', plain(candidate.error_after),
-                  sites(candidate.drives, diagnosis)) for candidate in diagnosis.candidates]))
+                [(candidate.name, f'{-candidate.cost:.0f}', plain(candidate.error_after),
+                  sites(candidate.names[0][1], diagnosis)) for candidate in diagnosis.candidates]))
 
 
 def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:

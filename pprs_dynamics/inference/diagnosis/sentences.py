@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
-from pprs_dynamics.inference.diagnosis.found_effects import (
-    Drives,
+from pprs_dynamics.inference.diagnosis.diagnosis import (
+    Diagnosis,
     FoundEffect,
     RankedSet,
     RivalEffect,
+    SinceReference,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -151,8 +151,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
-        tuple(f'{_placed(diagnosis, suspect.name, suspect.drives)}: possible, but slow noise '
-              f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
+        tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
+              f'explains the data as well (evidence {-suspect.cost:.0f}, threshold 0). '
               'Repeat the recording' for suspect in diagnosis.suspects),
         tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
               for ranked in diagnosis.barred),
@@ -194,14 +194,14 @@ def word_detectable(diagnosis: Diagnosis) -> str:
 # Sets of effects
 
 
-def _placed(diagnosis: Diagnosis, name: str, drives: Drives) -> str:
-    unknown, comma, variable = name.partition(', ')
-    name = f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
-    return with_drives(name, drives, diagnosis.residuals.drives)
-
-
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
-    return ' and '.join(_placed(diagnosis, *name) for name in ranked.names) or 'nothing missing'
+    found = []
+    for name, drives in ranked.names:
+        unknown, _, variable = name.partition(', ')
+        found.append(with_drives(
+            f'a pattern {place_of(variable)}' if variable and unknown == 'unknown' else name,
+            drives, diagnosis.residuals.drives))
+    return ' and '.join(found) or 'nothing missing'
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:

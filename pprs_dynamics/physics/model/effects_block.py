@@ -35,12 +35,6 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
     return found
 
 
-def with_uncertainties(values: Mapping[str, Any], effect: str,
-                       known: Mapping[str, float]) -> dict[str, Any]:
-    """Return values with the standard deviations of some parameters of an effect."""
-    return {**values, **{f'{UNCERTAINTIES}.{effect}.{key}': std for key, std in known.items()}}
-
-
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
     """Raise ModelError for an uncertainty that is none, or of nothing that an effect has."""
     active = parameters.get('effects.active') or ()
