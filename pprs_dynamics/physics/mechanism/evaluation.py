@@ -53,14 +53,6 @@ def run(loop: Any, *arguments: Any) -> Any:
     return result
 
 
-def elements(named: Any) -> Any:
-    """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
-
-    Compiled code takes the arrays unchanged.
-    """
-    return type(named)(*(array.data for array in named))
-
-
 def row_of(named: tuple[Any, ...]) -> Array:
     """Return all numbers in a named tuple of floats and of tuples, named or not, of the like.
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.evaluation import elements, run
+from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
     WARM_STEPS,
     actuator_efforts,
@@ -43,6 +43,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     JointFriction,
     Loads,
     Model,
+    elements,
     length_of,
     packed_tables,
     read_loads,

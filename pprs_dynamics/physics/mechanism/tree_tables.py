@@ -308,6 +308,14 @@ def _reader(kind: type) -> Callable[..., Any]:
     return read
 
 
+def elements(named: Any) -> Any:
+    """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
+
+    Compiled code takes the arrays unchanged.
+    """
+    return type(named)(*(array.data for array in named))
+
+
 def _is_real(name: str) -> bool:
     return Model._fields.index(name) >= Model._fields.index(FIRST_OF_REALS)
 

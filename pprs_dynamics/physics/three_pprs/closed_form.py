@@ -11,9 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.evaluation import elements, reader_of
+from pprs_dynamics.physics.mechanism.evaluation import reader_of
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample, vector
-from pprs_dynamics.physics.mechanism.tree_tables import DRIVE_FRICTION, JOINT_EFFORT, RIGID, TOTAL
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    RIGID,
+    TOTAL,
+    elements,
+)
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs.closure import (
     Twist,
