@@ -112,7 +112,7 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     true: Effects, tmp_path: Path,
 ) -> None:
     (name, truth), = true.items()
-    # The deviation of a delay follows from samples and noise alone: 8 s at 200 Hz know 6 ms to 13 %.
+    # Samples and noise alone decide how well a delay is known: here 6 ms to 13 % otherwise.
     noise = NOISE / 2 if name == 'time_delay' else NOISE
     first = record(with_effects(MODEL, true), noise)
     adoption = adopt(MODEL, EffectRequest(CATALOGUE[name]), [first])
