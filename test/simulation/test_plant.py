@@ -110,29 +110,6 @@ def platform() -> DriveModel:
     return DriveModel.load('config/paper.yaml')
 
 
-def test_a_platform_without_friction_keeps_its_energy(platform: DriveModel) -> None:
-    zero = {key: np.multiply(value, 0.0).tolist() for key, value in platform.values.items()
-            if key.startswith('friction.') and key.endswith(('viscous', 'coulomb'))}
-    plant = Plant(DriveModel.from_parameters({**platform.values, **zero}), rate=2000.0)
-    plant.place(plant.position, np.array([0.1, -0.05, 0.08, 0.05, -0.04, 0.06]))
-    effort = plant.holding(plant.position)
-
-    def energies() -> np.ndarray:
-        engine, motion = plant.engine, plant.engine.loops.put(
-            plant.position, plant.velocity, 0 * plant.velocity)
-        plant.engine.carried(motion)
-        engine.engine.mj_energyPos(engine.model, engine.data)
-        v = motion.velocity[0]
-        return np.array([v @ engine.inertia() @ v / 2,
-                         engine.data.energy[0] - effort @ plant.position])
-
-    start = energies()
-    for _ in range(400):
-        plant.step(effort)
-    # The midpoint rule is of second order: 0.5 ms against motions of tenths of a second.
-    assert abs(energies().sum() - start.sum()) < 1e-4 * start[0]
-
-
 def test_effects_change_while_it_runs(platform: DriveModel) -> None:
     plant = Plant(platform, ['coulomb_friction:lift_1,lift_2'], seed=3)
     (first,) = plant.injected

@@ -184,3 +184,12 @@ def test_noise_has_its_size_and_its_correlation() -> None:
     for lag in (1, 5):
         found = np.mean(noise[lag:] * noise[:-lag]) / noise.var()
         assert found == pytest.approx(0.36 * 0.9 ** lag, abs=0.04)
+
+
+def test_a_robot_that_the_engine_does_not_solve_stops_and_says_so() -> None:
+    robot = SimulatedRobot(Plant(DriveModel.load(), ['effort_offset'], scale=1e4))
+    for _ in range(50):
+        measurement = robot.tick()
+        # What is published stays what a robot can say.
+        assert np.abs(measurement.position).max() < 1.0
+    assert [note.code for note in robot.notes].count('STOPPED') == 1
