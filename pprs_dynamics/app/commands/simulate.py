@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
-    parser.add_argument('--effect', metavar='NAME', action='append', default=[],
+    parser.add_argument('--effect', metavar='EFFECT', action='append', default=[],
                         choices=(*NAMES, RANDOM),
                         help='an effect of the simulated robot that the model lacks: a name of '
                         'docs/effects.md, or random; its size depends on --seed; may be repeated')

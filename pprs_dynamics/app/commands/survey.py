@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     screen, store = console(), Path(options.output)
     pandas()
     if bool(options.recordings) == bool(options.manifest):
-        raise UsageError('recordings and --manifest: must be given one of them')
+        raise UsageError('recordings and --manifest: one of the two must be given')
     base = model_of(options.model)
     if options.effects != AUTO and not requests_of(options.effects, base):
         raise UsageError(f'--effects {options.effects!r}: must be auto or names of effects')

@@ -267,8 +267,8 @@ def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
     if purpose not in PURPOSES:
         raise PurposeError(f'purpose is {purpose!r}, must be one of {", ".join(PURPOSES)}')
     if purpose == SEPARATE and not recordings:
-        raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
-                           'what is to be told apart; a new robot starts with --purpose '
+        raise PurposeError('purpose separate: no recording is given, must be at least one, as its '
+                           'remaining candidates are separated; for a new robot: --purpose '
                            'commission')
 
 
