@@ -16,7 +16,6 @@ from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.motion.stick_slip import find_stick_slip
 
-
 STEP = 0.01  # [s]
 TIME = np.arange(0, 30, STEP)
 
