@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,9 +13,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.simulation.drive_control import Setpoint
-from pprs_dynamics.simulation.injected_forms import InjectedEffectError, tilted
+from pprs_dynamics.simulation.injected_forms import InjectedEffectError
 from pprs_dynamics.simulation.injection import draw_motion
 from pprs_dynamics.simulation.plant import Plant
 from pprs_dynamics.simulation.platform import as_mechanism
@@ -146,14 +144,3 @@ def test_effects_change_while_it_runs(platform: DriveModel) -> None:
         plant.inject(['viscous'])
     with pytest.raises(InjectedEffectError, match="not act in 'lift_1'"):
         plant.inject(['base_tilt:lift_1'])
-
-
-@pytest.mark.parametrize('gravity', [[0.0, 0.0, -9.81], [0.0, 9.81, 0.0]])
-def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
-    tmp_path: Path, gravity: list[float],
-) -> None:
-    angle = 0.02
-    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
-    tilt = BaseTilt({'x': angle, 'y': 0.0})
-    robot = replace(model.robot, gravity=tuple(gravity))
-    assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)
