@@ -30,7 +30,7 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, forces_kernel
+from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, _is_sound, read_parameters
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -217,7 +217,7 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     one_pass = model._one_pass
     assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    forces_kernel(_counted(one_pass.parameters.named), 0, table, NO_LOAD, _CountedTable())
+    _is_sound(_counted(read_parameters(one_pass.parameters)), 0, table, NO_LOAD, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

@@ -19,7 +19,6 @@ from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.mechanism.tree_tables import (
     ANGLE,
     AXES,
-    DRIVE_OF,
     KIND,
     LOOP,
     PASSIVE_OF,
@@ -249,13 +248,6 @@ def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, uni
     places[:, PASSIVE_OF] = columns_of(passive, len(q))
     return t._replace(rows=t.rows[every], row_reals=t.row_reals[every], passive=passive,
                       passive_unit=units[passive], places=places)
-
-
-def with_actuated_coordinates(t: Model, drives: Integers, count: int) -> Model:
-    """Return tables of so many coordinates, of which some are given."""
-    places = np.full((count, 2), -1)
-    places[:, DRIVE_OF] = columns_of(drives, count)
-    return t._replace(drives=drives, places=places)
 
 
 def columns_of(coordinates: Integers, count: int) -> Integers:

@@ -13,7 +13,6 @@ import dis
 import hashlib
 from collections.abc import Callable
 from functools import cache
-from itertools import count
 from types import CellType, CodeType, FunctionType
 from typing import Any
 
@@ -27,7 +26,7 @@ PACKAGE = 'pprs_dynamics'
 @cache
 def compiled_function(function: FunctionType) -> Callable[..., Any]:
     """Return a function compiled for the arguments that it gets, kept on disk."""
-    return _stored(_keyed(_bound(function), function))
+    return _stored(_keyed(_bound(function), _fingerprint(function)))
 
 
 def _stored(function: FunctionType) -> Callable[..., Any]:
@@ -42,7 +41,7 @@ def _stored(function: FunctionType) -> Callable[..., Any]:
     return compiled
 
 
-def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
+def _keyed(function: FunctionType, fingerprint: str) -> FunctionType:
     """Return a function that Numba stores under the code of itself and all that it calls.
 
     Numba looks only at the file of a function to decide whether stored code is up to date. All
@@ -51,25 +50,19 @@ def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
     function = FunctionType(function.__code__.replace(co_filename=__file__),
                             function.__globals__, function.__name__, function.__defaults__,
                             function.__closure__)
-    function.__qualname__ = f'{function.__name__}_{_fingerprint(*sources)}'
+    function.__qualname__ = f'{function.__name__}_{fingerprint}'
     function.__module__ = __name__
     return function
 
 
-def _fingerprint(*sources: Any) -> str:
-    """Return a hash of the code of functions and of all that they call and read.
-
-    Parameters
-    ----------
-    sources : function, type or str
-    """
-    content, waiting = hashlib.sha256(), [*sources]
+def _fingerprint(function: FunctionType) -> str:
+    """Return a hash of the code of a function and of all that it calls and reads."""
+    content = hashlib.sha256()
+    waiting: list[Any] = [function]
     seen: set[Any] = set()
     while waiting:
         source = waiting.pop()
-        if isinstance(source, str):
-            content.update(source.encode())
-        elif isinstance(source, FunctionType) and source not in seen:
+        if isinstance(source, FunctionType) and source not in seen:
             seen.add(source)
             # A docstring is a constant, too, but nothing that is compiled depends on it.
             content.update(_code_text(source.__code__, source.__doc__).encode())
@@ -92,51 +85,6 @@ def _code_text(code: CodeType, doc: str | None) -> str:
                  for constant in code.co_consts if constant != doc or doc is None]
     # Instructions have numbers of names: those that read m.w and m.u are the same.
     return repr((code.co_code, code.co_names, code.co_freevars, constants))
-
-
-def _template(row: Any, *tables: Any) -> int:
-    p = read(row)  # type: ignore[name-defined]  # noqa: F821
-    first = -1
-    for s in range(len(tables[0])):
-        if not kernel(p, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
-            first = s
-    return first
-
-
-def compiled_kernel(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
-    """Return a kernel compiled with a loop over the samples; it takes parameters as a row.
-
-    Parameters
-    ----------
-    kernel : function
-    named : named tuple
-        Parameters of the form that the kernel takes.
-    """
-    reader = _reader(named)
-    own = {'kernel': _compiled(kernel), 'read': _inlined(reader)}
-    loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
-                        f'{kernel.__module__}_{kernel.__name__}'.replace('.', '_'))
-    return _stored(_keyed(loop, _template, kernel, reader))
-
-
-def _reader(named: tuple[Any, ...]) -> Any:
-    """Return a function that makes named tuples of this form from a row of their numbers."""
-    namespace: dict[str, Any] = {}
-    index = count()
-
-    def expression(value: Any) -> str:
-        if not isinstance(value, tuple):
-            return f'row[{next(index)}]'
-        elements = ''.join(f'{expression(element)}, ' for element in value)
-        if type(value) is tuple:
-            return f'({elements})'
-        namespace[type(value).__name__] = type(value)
-        return f'{type(value).__name__}({elements})'
-
-    # Written out: Numba makes named tuples only where all their elements are.
-    source = f'def read(row):\n    return {expression(named)}'
-    exec(source, namespace)
-    return namespace['read']
 
 
 @cache

@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Evaluation of the equations over samples, by functions that Numba compiles.
+"""Evaluation of the equations over samples, by loops that Numba compiles.
 
-A *kernel* is a function `kernel(p, s, *tables)` that reads sample s of tables, evaluates
-equations and writes sample s of other tables; it returns whether the sample is sound. Tables are
-(N, k) float64, `p` is a named tuple of parameters. It is compiled together with a loop over s. A
-*loop* is a function that contains its loop over the samples.
+A *loop* is a function that evaluates equations for all samples of tables in turn and writes to
+other tables.
 
 Loading compiled code takes 0.3 s, compiling it the first time 15 s. Where nothing may wait for
 that, the same functions run as Python: 0.2 ms a sample, 8 ms of a hexapod.
@@ -17,83 +15,28 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Generic, TypeVar
+from itertools import count
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 
-Function = Callable[..., Any]
-P = TypeVar('P', bound=tuple[Any, ...])
+Loop = Callable[..., Any]
 
 # What Python raises where compiled code returns infinities.
 NOT_DEFINED = ZeroDivisionError, OverflowError, ValueError
 
-_compiled: dict[Function, Function] = {}
+_compiled: dict[Loop, Loop] = {}
 _compiling: set[int] = set()  # threads that compile while others must not wait
 _waiting: set[int] = set()  # threads that do not compile yet
 
 
-class KernelParameters(Generic[P]):
-    """The parameters of a kernel in both forms.
-
-    Parameters
-    ----------
-    named : named tuple
-        Of floats and of tuples, named or not, of the like.
-
-    Attributes
-    ----------
-    row : (K,) array
-        All numbers in `named`, in order. Handing it to compiled code takes a third of a
-        microsecond, the named tuple itself four: half as long as the forces of a sample.
-    """
-
-    __slots__ = ('named', 'row')
-
-    def __init__(self, named: P) -> None:
-        self.named = named
-        self.row = np.array(_numbers(named))
-
-
-def _numbers(named: tuple[Any, ...]) -> list[float]:
-    numbers: list[float] = []
-    for value in named:
-        if isinstance(value, tuple):
-            numbers += _numbers(value)
-        else:
-            numbers.append(float(value))
-    return numbers
-
-
-def evaluate(kernel: Function, parameters: KernelParameters[Any], *tables: Array) -> int:
-    """Run a kernel over all samples; return the first that is not sound, or -1.
-
-    Parameters
-    ----------
-    kernel : function
-    parameters : KernelParameters
-        Of the same form in every call with this kernel.
-    tables : arrays
-        C-contiguous; the first is (N, k), N samples.
-    """
-    ready = _compiled.get(kernel)
-    if ready is not None:
-        first: int = ready(parameters.row, *tables)
-        return first
-    if _must_not_wait():
-        try:
-            return _on_floats(kernel, parameters.named, tables)
-        except NOT_DEFINED:
-            pass
-    from pprs_dynamics.physics.mechanism.compilation import compiled_kernel
-
-    first = _first_call(kernel, compiled_kernel(kernel, parameters.named), parameters.row, *tables)
-    return first
-
-
 def run(loop: Any, *arguments: Any) -> Any:
-    """Return the result of a loop, for arguments of the same types in every call."""
+    """Return the result of a loop, for arguments of the same types in every call.
+
+    Arrays are C-contiguous.
+    """
     ready = _compiled.get(loop)
     if ready is not None:
         return ready(*arguments)
@@ -104,27 +47,52 @@ def run(loop: Any, *arguments: Any) -> Any:
             pass
     from pprs_dynamics.physics.mechanism.compilation import compiled_function
 
-    return _first_call(loop, compiled_function(loop), *arguments)
-
-
-def _first_call(function: Function, compiled: Function, *arguments: Any) -> Any:
-    result = compiled(*arguments)
-    _compiled[function] = compiled  # only now: another thread would wait for the compiler
+    ready = compiled_function(loop)
+    result = ready(*arguments)
+    _compiled[loop] = ready  # only now: another thread would wait for the compiler
     return result
 
 
-def _on_floats(kernel: Function, p: tuple[Any, ...], tables: tuple[Array, ...]) -> int:
-    # Elements of memoryviews are Python's floats, which are faster than NumPy's.
-    views = [table.data for table in tables]
-    for s in range(len(tables[0])):
-        if not kernel(p, s, *views):
-            return s
-    return -1
+def row_of(named: tuple[Any, ...]) -> Array:
+    """Return all numbers in a named tuple of floats and of tuples, named or not, of the like.
+
+    Compiled code takes a row in a third of a microsecond and the named tuple in four, half as long
+    as the forces of a sample.
+    """
+    return np.array([*_numbers(named)])
 
 
-def is_ready(kernel: Function) -> bool:
-    """Return whether a kernel is compiled already, or others are: then it takes no time either."""
-    return kernel in _compiled or (bool(_compiled) and not _must_not_wait())
+def _numbers(named: tuple[Any, ...]) -> Iterator[float]:
+    for value in named:
+        if isinstance(value, tuple):
+            yield from _numbers(value)
+        else:
+            yield float(value)
+
+
+def reader_of(named: tuple[Any, ...]) -> Callable[[Any], Any]:
+    """Return a function that makes named tuples of this form from a row of their numbers."""
+    namespace: dict[str, Any] = {'__name__': __name__}
+    index = count()
+
+    def expression(value: Any) -> str:
+        if not isinstance(value, tuple):
+            return f'row[{next(index)}]'
+        inside = ''.join(f'{expression(element)}, ' for element in value)
+        if type(value) is tuple:
+            return f'({inside})'
+        namespace[type(value).__name__] = type(value)
+        return f'{type(value).__name__}({inside})'
+
+    # Written out: Numba makes named tuples only where all their elements are.
+    exec(f'def read(row):\n    return {expression(named)}', namespace)
+    read: Callable[[Any], Any] = namespace['read']
+    return read
+
+
+def is_ready(loop: Loop) -> bool:
+    """Return whether a loop is compiled already, or others are: then it takes no time either."""
+    return loop in _compiled or (bool(_compiled) and not _must_not_wait())
 
 
 def _must_not_wait() -> bool:

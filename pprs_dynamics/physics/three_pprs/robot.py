@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ConvergenceError, ModelError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.physics.mechanism.evaluation import row_of, run
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -110,9 +110,8 @@ class ClosedForm:
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
             table = np.empty((closed_form.EVERYTHING, len(motion), 6))
-            parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
-            self.is_regular = evaluate(
-                closed_form.forces_kernel, parameters, motion.rows, loads, table) < 0
+            self.is_regular = run(closed_form.forces, robot.friction_parameters(joints),
+                                  motion.rows, loads, table) < 0
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
@@ -289,7 +288,7 @@ class ThreePprs:
     @property
     def numbers(self) -> Array:
         """All numbers that determine the forces, in one row."""
-        return KernelParameters(self.kernel_parameters).row
+        return row_of(self.kernel_parameters)
 
     @property
     def position_step(self) -> float:
@@ -335,21 +334,22 @@ class ThreePprs:
         return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
                                Vector(*self.gravity))
 
-    def parameters(self, joints: Joints, drives: tuple[DriveParameters, ...],
-                   ) -> KernelParameters[closed_form.ForcesParameters]:
-        """Return the parameters of `forces_kernel` with friction of joints and drives."""
-        return KernelParameters(closed_form.ForcesParameters(
+    def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
+        """Return the parameters of `closed_form.forces`, for `one_pass`.
+
+        Parameters
+        ----------
+        joints : Joints
+        drives : (OF_DRIVE, 6) array, optional
+            Without it the drives have no friction.
+        """
+        friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
+            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist())
+        return row_of(closed_form.ForcesParameters(
             self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
-            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives))
+            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, friction))
 
-    def friction_parameters(self, joints: Joints, drives: Array,
-                            ) -> KernelParameters[closed_form.ForcesParameters]:
-        """Return friction of joints and numbers of drives, (OF_DRIVE, 6), for `one_pass`."""
-        return self.parameters(joints, tuple(
-            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist()))
-
-    def one_pass(self, motion: PlatformMotion,
-                 parameters: KernelParameters[closed_form.ForcesParameters], closed: object,
+    def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
                  ) -> PassResult | None:
         """Return the forces for a motion, friction included.
 
@@ -358,7 +358,7 @@ class ThreePprs:
         rows = motion.rows
         table = np.empty((closed_form.EVERYTHING if len(rows) <= SHORT else closed_form.FORCES,
                           len(rows), 6))
-        first = evaluate(closed_form.forces_kernel, parameters, rows, closed_form.NO_LOAD, table)
+        first = run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table)
         return PassResult(table) if first < 0 else None
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
