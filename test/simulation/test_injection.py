@@ -215,6 +215,19 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
     assert np.all(np.sqrt(np.mean(exact ** 2, axis=0)) > noise)
 
 
+def test_a_payload_of_a_3_pprs_is_at_the_centre_of_mass_of_platform_and_payload() -> None:
+    plain = plain_platform()
+    run = Injection(plain, [named('payload_mass', np.random.default_rng(1), 1.0)],
+                    np.random.default_rng(2))
+    heavier = DriveModel.from_parameters({
+        **PLATFORM.values, 'effects.active': ['payload_mass'],
+        'effects.payload_mass.mass': run.truths[0]['parameters']['mass']})
+    motion = Excitation(seed=3).motion(np.arange(300) / 100)
+    exact = heavier.drive_forces(motion).total - PLATFORM.drive_forces(motion).total
+    error = run.efforts - plain.effort - exact
+    assert np.all(error.std(axis=0) < 0.01 * exact.std(axis=0))
+
+
 def test_given_drives_have_the_effect() -> None:
     run = Injection(plain_platform(), [named('effort_offset:lift_1,slide_2',
                                              np.random.default_rng(0), 1.0)],
