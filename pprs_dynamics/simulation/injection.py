@@ -20,14 +20,15 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError, suggestion
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,
+    REFERENCE,
     SIZE,
     STEEPNESS,
     UNKNOWN,
@@ -36,15 +37,12 @@ from pprs_dynamics.simulation.injected_forms import (
     ahead,
     algebraic_sign,
     draw_form,
+    draw_temperatures,
     eyring,
+    read_thermometers,
     tilted,
 )
-from pprs_dynamics.simulation.platform import BALLS, HINGES, RODS, PlatformMechanism
-from pprs_dynamics.simulation.temperatures import (
-    REFERENCE,
-    draw_temperatures,
-    read_thermometers,
-)
+from pprs_dynamics.simulation.platform import PlatformMechanism
 
 RATE = 100.0  # [Hz]
 CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders
@@ -481,11 +479,18 @@ def _eccentric_encoder(run: Injection) -> Injected:
 
 
 def _payload_mass(run: Injecting) -> Injected:
-    """Hang a point of a share of the robot's mass 5 cm before the tool."""
-    engine = run.engine
+    """Hang a point of a share of the robot's mass 5 cm before the tool.
+
+    On a 3-PPRS at the centre of mass of platform and payload, as the effect is defined there.
+    """
+    engine, robot = run.engine, run.engine.robot
     share = run.sizes(lambda: {'share': run.size(0.05, 0.12)})['share']
-    mass = share * float(engine.robot.masses.sum())
-    engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, 0.05), np.zeros((3, 3))))
+    mass, tool = share * float(robot.masses.sum()), engine.structure.tool
+    centre = np.array([0.0, 0.0, 0.05])
+    if isinstance(run.model, PlatformMechanism):
+        row, frame = engine.structure.links[tool]
+        centre = frame.inverse.of_point(robot.by_joint[row, 1:4] / robot.by_joint[row, 0])
+    engine.carry(tool, body_at(mass, tuple(centre), np.zeros((3, 3))))
     return None, {'mass': mass}
 
 

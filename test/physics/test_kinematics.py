@@ -17,10 +17,8 @@ from random_states import (
     inverse_kinematics,
     paper_geometry,
     paper_model,
-    random_motion,
     random_poses,
     random_robot,
-    smooth_motion,
 )
 from scipy.optimize import brentq, root
 from scipy.spatial.transform import Rotation
@@ -29,7 +27,6 @@ from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import (
     ConvergenceError,
     MotionError,
-    PprsError,
     SingularityError,
     WorkspaceError,
 )
@@ -58,11 +55,6 @@ def forward(geometry, q):
     return replace(paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
 
 
-def rotation_vector(motion):
-    """Return the rotation vector of a motion's first sample."""
-    return Rotation.from_quat(motion.orientation[0]).as_rotvec()
-
-
 def solve(geometry, motion):
     """Return chains and [B] of a motion."""
     found = inverse_kinematics(geometry, motion)
@@ -76,15 +68,6 @@ def home_determinant(geometry):
 
 
 # Inverse and forward -------------------------------------------------------------------------
-
-def test_inverse_kinematics_satisfies_the_closure_equations(geometry):
-    motion = random_motion(np.random.default_rng(1), 200, geometry.elbow)
-    q = inverse_kinematics(geometry, motion).position
-    for sample in range(len(motion)):
-        gap = closure(geometry, q[sample], motion.position[sample],
-                      rotation_vector(motion[sample]))
-        assert np.abs(gap).max() < 1e-15
-
 
 @every_elbow
 @pytest.mark.parametrize('robot', ['paper', 'unequal'])
@@ -151,16 +134,6 @@ def test_drive_positions_that_are_none_raise(q):
         paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
 
 
-def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():
-    # Platform joints a quarter turn on: det [B] = 0 at home, so its sign there is rounding.
-    quarter = tuple(np.asarray(paper_geometry().platform_angles) + np.pi / 2)
-    geometry = replace(paper_geometry(), platform_angles=quarter)
-    poses = PlatformMotion.at_rest(*random_poses(np.random.default_rng(10), 1))
-    q = inverse_kinematics(geometry, poses).position
-    with pytest.raises(PprsError, match='home'):
-        forward(geometry, q)
-
-
 def yaw_with_share(geometry, share):
     """Return the home pose yawed until det [B] is `share` of its value at home."""
     def pose(yaw):
@@ -182,29 +155,6 @@ def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
     q = inverse_kinematics(geometry, pose).position
     found = forward(geometry, q)
     assert_allclose(found.position, pose.position, rtol=0, atol=1e-9)
-
-
-# Rates ---------------------------------------------------------------------------------------
-
-def test_velocities_and_accelerations_are_derivatives_of_positions(geometry):
-    t, h = np.linspace(0, 6, 200), 1e-3
-    middle = inverse_kinematics(geometry, smooth_motion(t, geometry.elbow))
-    around = {k: inverse_kinematics(geometry, smooth_motion(t + k * h, geometry.elbow))
-              for k in (-2, -1, 1, 2)}
-
-    def first(name):
-        f = {k: getattr(chains, name) for k, chains in around.items()}
-        return (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12 * h)
-
-    # O(h^4) of motions of a few rad/s, and rounding 1e-16 / h.
-    assert_allclose(middle.velocity, first('position'), rtol=0, atol=1e-9)
-    assert_allclose(middle.u_dot, first('rod_angle'), rtol=0, atol=1e-9)
-    assert_allclose(middle.acceleration, first('velocity'), rtol=0, atol=1e-8)
-    assert_allclose(middle.u_ddot, first('u_dot'), rtol=0, atol=1e-8)
-    assert np.abs(middle.u_ddot).max() > 0.5
-
-
-# Jacobians -----------------------------------------------------------------------------------
 
 
 # Out of reach and singular -------------------------------------------------------------------
