@@ -336,7 +336,7 @@ class Search:
         # Another direction of weight is credible only for efforts that show the weight.
         concerned = [likelihood(d, float(found.scales[d])).prior for d in measured
                      if d in reading.drives]
-        is_turned = reading.kind in ('position_offset', 'mounting')
+        is_turned = reading.kind in ('position_offset', 'position_unit', 'mounting')
         return None if is_turned and min(concerned, default=0.0) > table.PLAUSIBLE else found
 
     def _factors(self, evidence: Evidence, reading: Reading) -> Array:
