@@ -30,8 +30,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 
-HOMING_SAMPLES = 100  # of a motion, at which the slow columns of wrong zeros are computed
-
 
 @dataclass(frozen=True, eq=False)
 class FittedTerm:
@@ -162,7 +160,6 @@ class ColumnPlan:
         block : int
             Samples that are averaged.
         """
-        self._sensitivities.homing_stride = max(1, len(time) // HOMING_SAMPLES)
         return Design.planned(self._sensitivities, forces, time, block)
 
     @cached_property
