@@ -88,7 +88,7 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     places, damping = size * STARTS, np.full(len(STARTS), FIRST_DAMPING)
 
     def left(places: Array) -> tuple[Array, Array]:
-        """Return costs (S,), and derivatives of what the mass that fits best leaves."""
+        """Return the residual of the mass that fits best at each place, and its derivatives."""
         parameters, slopes = _point_mass(places)
         u, by_place = parameters @ R.T, np.einsum('ij,sjk->sik', R, slopes)
         square = np.maximum(np.sum(u * u, axis=1), 1e-300)
