@@ -138,23 +138,23 @@ workbench: $(VENV)/.test
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels and compiling its equations (about a minute) ...'
 	@$(BIN)/pip install -qq --upgrade pip
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,workbench]'
 	@$(BIN)/python -m pprs_dynamics.physics.model.preparation
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,workbench,fleet,test]'
 	@touch $@
 
 $(VENV)/.naming: $(VENV)/.test
 	@echo 'Installing the peers of the naming benchmark ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test,naming]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,workbench,fleet,test,naming]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.demo
 	@echo 'Installing Sphinx for the documentation ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,docs]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,workbench,fleet,docs]'
 	@touch $@
 
 $(VENV)/bin/python:

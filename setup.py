@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-import importlib.util
 import subprocess
 import sys
 from glob import glob
@@ -18,7 +17,7 @@ MAINTAINER = DESCRIPTION.find('maintainer')
 
 
 class InstallCompiled(install):
-    """Installs, and leaves the equations compiled beside them where Numba is.
+    """Installs, and leaves the equations compiled beside them.
 
     As `colcon build` does it. pip runs this in a folder that it packs into a wheel, where nothing
     can be left: the nodes compile at their first start then, while they answer already.
@@ -26,7 +25,7 @@ class InstallCompiled(install):
 
     def run(self):
         super().run()
-        if self.root is None and importlib.util.find_spec('numba') is not None:
+        if self.root is None:
             # An installation that cannot compile is one without compiled kernels, no failure.
             subprocess.run([sys.executable, '-m', 'pprs_dynamics.physics.model.preparation'],
                            cwd=self.install_lib, check=False, stderr=subprocess.DEVNULL)
@@ -55,7 +54,8 @@ setup(
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.11',
-    install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'pandas>=2.1', 'PyYAML>=6'],
+    install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'numba>=0.58', 'pandas>=2.1',
+                      'PyYAML>=6'],
     extras_require={
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
@@ -64,7 +64,6 @@ setup(
         # The terminal, its completion, pictures, pages.
         'report': ['rich>=13', 'argcomplete>=3', 'matplotlib>=3.8', 'plotly>=5.20'],
         'sim': ['mujoco>=4.0'],
-        'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
         'fleet': ['distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9'],
         # Tables by columns of the model file: pyarrow reads Parquet.

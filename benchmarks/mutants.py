@@ -4,7 +4,7 @@
 """Do the tests see a mistake in the equations? Mutants of the modules that decide, by Cosmic Ray.
 
 Of every module a fixed sample of mutants is tried, each in a copy of the sources, against that
-module's focused tests alone. Compiled kernels are run uncompiled: each mutant would compile anew.
+module's focused tests alone. Numba is switched off: each mutant would compile anew.
 
     python -m benchmarks.mutants [MODULE ...] [--count 8] [--json output/mutants.json]
 """
@@ -39,17 +39,16 @@ COUNT = 8  # mutants of a module
 TIMEOUT = 240.0  # [s] for the tests of a mutant; one that hangs them is killed
 # Substitutes that no hand would write and any test would see: they would only flatter the share.
 CHEAP = ('LShift', 'RShift', 'BitAnd', 'BitOr', 'BitXor', '_Invert', 'USub_Not', 'RemoveDecorator')
-# No module of these is imported by pytest before a test asks for it.
-UNCOMPILED = "import sys\nsys.modules['numba'] = None\n"
 
-SEARCH = ('inference/test_invariants_of_diagnosis.py', 'inference/test_search.py')
+SEARCH = ('inference/test_hypothesis_space.py', 'inference/test_invariants_of_diagnosis.py')
+ENGINES = ('physics/test_dynamics.py', 'physics/test_physics_engines.py')
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
 TESTS = {
-    'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
-    'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
-    'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
-    'physics/three_pprs/passive_friction.py': ('physics/test_dynamics.py',),
-    'physics/effects/foreign_effects.py': ('physics/test_foreign_effects.py',),
+    'physics/three_pprs/inverse_kinematics.py': ENGINES,
+    'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', *ENGINES),
+    'physics/three_pprs/rigid_body.py': ENGINES,
+    'physics/three_pprs/independent_chains.py': ENGINES,
+    'physics/effects/catalogue.py': ('physics/test_foreign_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'inference/residuals/noise.py': ('inference/test_noise.py',),
@@ -58,11 +57,10 @@ TESTS = {
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
     'inference/search/search.py': SEARCH,
     'inference/search/fitted_sets.py': SEARCH,
-    'inference/search/table.py': ('inference/test_hypothesis_space.py', *SEARCH,
-                                  'inference/test_model_table.py'),
+    'inference/search/table.py': SEARCH,
     'inference/search/candidates.py': (*SEARCH, 'inference/test_prior_costs.py'),
     'inference/search/held_out.py': ('inference/test_gates.py', *SEARCH),
-    'inference/search/form_error.py': ('inference/test_gates.py', 'inference/test_search.py'),
+    'inference/search/form_error.py': SEARCH,
     'ros/force_command.py': ('ros/test_force_command.py',),
     'ros/messages/measured_states.py': ('ros/test_measured_states.py',),
     'ros/messages/trajectory_request.py': ('ros/test_trajectory_requests.py',
@@ -151,14 +149,14 @@ def _tried(module: str, count: int) -> Iterator[Mutant]:
         for name in COPIED:
             shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns('__pycache__'))
         shutil.copy(ROOT / 'pyproject.toml', copy)
-        (copy / 'uncompiled.py').write_text(UNCOMPILED)
         path = copy / 'pprs_dynamics' / module
         tests = [str(copy / 'test' / name) for name in TESTS[module]]
         sources = ':'.join(str(copy / part) for part in (
             '', 'test', 'test/support', 'demo', 'benchmarks'))
         # From the copy's folder: `python -m` finds modules there before all others.
-        command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} '
-                   '-m pytest -x -q -m "not slow" -p uncompiled -p no:cacheprovider '
+        command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 '
+                   f'NUMBA_DISABLE_JIT=1 {sys.executable} '
+                   '-m pytest -x -q -m "not slow" -p no:cacheprovider '
                    f'--rootdir {copy} '
                    f'{" ".join(tests)}')
         outcome, output = run_tests(command, TIMEOUT)

@@ -36,7 +36,7 @@ def rows(command: str) -> Iterator[str]:
         if action.option_strings and action.nargs != 0:
             name += f' {action.metavar or action.dest.upper()}'
         text = re.sub(r'\s+', ' ', action.help or '').replace('|', r'\|')
-        yield f'| `{name}` | {text % vars(action) if "%(" in text else text} |'
+        yield f'| `{name}` | {text % vars(action)} |'
 
 
 def table() -> str:

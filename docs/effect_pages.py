@@ -32,7 +32,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.mechanism.places import PLATFORM
+from pprs_dynamics.physics.mechanism.state import PLATFORM
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         UnreadableFileError,
         WorkspaceError,
     )
-    from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
+    from pprs_dynamics.inference.experiments.motion_design import MotionLimits
     from pprs_dynamics.measurement.files.recording import (
         Recording,
         read_recording,
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.drive_model import DriveModel
     from pprs_dynamics.physics.model.forces import Forces, ModelState
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'CatalogueEffect',
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'Array', 'CatalogueEffect',
            'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
            'FitResult', 'Forces', 'HelicalPath', 'JointMotion', 'LimitError',
@@ -83,7 +83,7 @@ _HOMES = {
         'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
         'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
         'WorkspaceError'),
-    'inference.experiments.motion_limits': ('ArmLimits', 'MotionLimits'),
+    'inference.experiments.motion_design': ('MotionLimits',),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
         'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),

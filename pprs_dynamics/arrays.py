@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-# In kernels, which are run on one sample or on many: a number or one a sample, and which sample.
+# A number, or one a sample.
 Value = float | Array
-Sample = int | slice
 
 
 def as_numbers(values: ArrayLike) -> Array:

@@ -33,7 +33,7 @@ def colcon_environment(domain: int) -> dict[str, str]:
     inherited.setdefault('AMENT_PREFIX_PATH', str(prefix.parent))
     # A new folder would be compiled anew, for longer than the node is waited for here.
     return {**inherited, 'PATH': f'{prefix}{os.pathsep}{inherited["PATH"]}',
-            'PPRS_DYNAMICS_PLAIN': '1'}
+            'NUMBA_DISABLE_JIT': '1'}
 
 
 def copy_source(workspace: Path, names: tuple[str, ...]) -> None:

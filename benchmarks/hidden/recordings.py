@@ -35,6 +35,7 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.injected_forms import read_thermometers
 from pprs_dynamics.simulation.injection import (
     CLIMATE,
     NAMES,
@@ -45,7 +46,6 @@ from pprs_dynamics.simulation.injection import (
 )
 from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.sensors import SensorSettings
-from pprs_dynamics.simulation.temperatures import read_thermometers
 
 # What of the catalogue can be injected into a 3-PPRS.
 IN_CATALOGUE = tuple(name for name in NAMES if name not in (

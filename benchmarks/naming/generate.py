@@ -142,7 +142,7 @@ def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
 def _write_model(robot: str, model: DriveModel, folder: Path) -> None:
     if robot == '3-PPRS':
         (folder / 'model.yaml').write_text(format_model(model.values))
-        robot = export_robot(express(model, 'mjcf'), 'mjcf')
+        robot = export_robot(express(model, 'mjcf'))
         (folder / 'model.xml').write_text(written(robot, 'mjcf'))
         return
     source = model_of(robot)

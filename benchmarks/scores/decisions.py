@@ -35,7 +35,7 @@ EVERY = 3  # of the effects of the catalogue, every third
 ROWS = {'effects': 'good', 'pairs': 'good', 'forms': 'exact', 'unknown': 'good', 'nothing': 'good'}
 # What changes words and warnings only.
 TOLD = ('suspect_margin', 'statement_share', 'noise_accuracy', 'good', 'poor', 'sure', 'edge_share',
-        'short', 'few_samples', 'unexcited', 'one_way', 'filtered', 'reversal_share')
+        'short', 'few_samples', 'unexcited', 'one_way', 'filtered')
 NUMBERS = tuple(one.name for one in fields(Decisions) if one.name not in TOLD)
 # A case, the number that is changed, and by what.
 Changed = tuple[Case, str, float]

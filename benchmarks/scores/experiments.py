@@ -40,12 +40,11 @@ from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.motion_design import Motions, platform_motion
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, platform_motion
 from pprs_dynamics.inference.experiments.next_experiment import design_experiment
 from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
 from pprs_dynamics.simulation.sensors import SensorSettings

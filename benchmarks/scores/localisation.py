@@ -28,7 +28,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.localisation import localise
+from pprs_dynamics.inference.diagnosis.comparison import localise
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.physics.mechanism.paths import Excitation
 

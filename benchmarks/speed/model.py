@@ -29,9 +29,8 @@ from benchmarks.speed.peers import MujocoPeer, PinocchioPeer
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
-from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, forces_kernel
+from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, _is_sound, read_parameters
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -48,7 +47,7 @@ def main(rounds: int) -> None:
     for peer in peers:
         gap = np.abs(peer.many(motion) - forces.parts['rigid_body']).max()
         assert gap < AGREEMENT, f'{peer.name} is {gap} N off'
-    print(f'model compiled: {is_compiled()}; {rounds} rounds; peers agree within {AGREEMENT:g} N')
+    print(f'{rounds} rounds; peers agree within {AGREEMENT:g} N')
     one_sample(model, peers, motion, rounds)
     batches(model, peers, motion, rounds)
     growth(model, motion)
@@ -161,9 +160,7 @@ def start() -> None:
                   'DriveModel.load().drive_forces(PlatformMotion.at_rest((0, 0, 0.5)))')
     for name, code in (('python alone', 'pass'), ('import numpy', 'import numpy'),
                        ('import pprs_dynamics', 'import pprs_dynamics'),
-                       ('first evaluation, caches warm', evaluation),
-                       ('first evaluation, not compiled',
-                        f'import os; os.environ[{PLAIN!r}] = "1"; {evaluation}')):
+                       ('first evaluation, caches warm', evaluation)):
         elapsed, used = np.inf, np.inf
         for _ in range(5):
             begin, before = time.perf_counter(), _processor_of_children()
@@ -220,7 +217,7 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     one_pass = model._one_pass
     assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    forces_kernel(_counted(one_pass.parameters.named), 0, table, NO_LOAD, _CountedTable())
+    _is_sound(_counted(read_parameters(one_pass.parameters)), 0, table, NO_LOAD, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

@@ -49,7 +49,6 @@ from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardwar
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
-from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 
 try:
     from control_msgs.msg import JointTrajectoryControllerState
@@ -73,7 +72,6 @@ class FeedforwardNode(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
-        self._log = ThrottledLog(self)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
@@ -101,8 +99,7 @@ class FeedforwardNode(ManagedNode):
         self._counted = (0, 0, time.monotonic())
         self._files = files_given(arguments)
         self._status = StatusReporter(
-            self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
-            hardware_of(self._settings.model), self._refresh)
+            self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
         self.begin(node_values[AUTOSTART.name])
 
@@ -192,14 +189,15 @@ class FeedforwardNode(ManagedNode):
             return
         self._command(answer)
         # What is left may take its time: the drives have their command.
-        self._compute_time.add(time.perf_counter() - began)
+        self._compute_time.append(time.perf_counter() - began)
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
         # Without a clock nothing can be said of a stamp, and a wait for it would not end.
-        self._watchdog.feed(request.end - (now or request.start))
+        self._watchdog.feed(
+            request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
-            self._lag.add(max(0.0, _since(info['received_timestamp'])
+            self._lag.append(max(0.0, _since(info['received_timestamp'])
                               - (time.perf_counter() - began)))
         self._report_condition(answer)
 
@@ -261,9 +259,9 @@ class FeedforwardNode(ManagedNode):
         elif self._beyond_curve:
             report('WARN', 'CURVE', self._beyond_curve)
         elif self._lagging:
-            report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median, or '
-                   'most are passed over for later ones: they come faster than they are answered, '
-                   'or the machine is busy')
+            report('WARN', 'LAG', 'messages wait longer than lag_warning at the median, or most '
+                   'are passed over: they come faster than they are answered, or the '
+                   'machine is busy')
         else:
             report('OK', 'OK', 'commands follow the trajectory')
 
@@ -310,7 +308,6 @@ class FeedforwardNode(ManagedNode):
             self._counters['stale'] += 1
             text = f'{text}; {self._do_timeout_action()}'
         self._status.report('ERROR', rejection.code, text)
-        self._log.warning('rejected', f'rejected, {rejection.code}: {text}')
 
     # --- stale commands -------------------------------------------------------------------------
 
@@ -324,10 +321,9 @@ class FeedforwardNode(ManagedNode):
         elif ended:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
         else:
-            reason = ('the clock has stood still' if clock_stands else 'no valid trajectory')
-            text = f'{reason} for {timeout:g} s: {done}'
+            text = ('ROS time does not advance' if clock_stands
+                    else f'no valid trajectory for {timeout:g} s') + f': {done}'
             self._status.report('STALE', 'STALE', text)
-            self._log.warning('stale', text)
 
     def _last_word(self) -> None:
         """Do the timeout's action now where a command is in force, and see it off."""
@@ -401,12 +397,13 @@ class FeedforwardNode(ManagedNode):
         before, passed_before, then = self._counted
         self._counted = (accepted, passed, now)
         threshold = self._settings.node_values['lag_warning']
-        waits = self._lag.median > threshold or passed - passed_before > accepted - before
+        lag = self._lag.summary()
+        waits = (lag['p50'] or 0.0) > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
             state=self.state, assumed=self._settings.model.assumed_at_start,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
-            compute_time=self._compute_time.summary(), lag=self._lag.summary(),
+            compute_time=self._compute_time.summary(), lag=lag,
             lagging=bool(threshold and accepted > before and waits),
             model={'files': self._files, 'sha256': self._settings.model.fingerprint},
             changes=len(self._settings.history or ()))

@@ -16,8 +16,7 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
-from pprs_dynamics.physics.mechanism.drive_path import DrivePath
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_motion import DrivePath, JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState

@@ -30,7 +30,7 @@ from std_srvs.srv import Trigger
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import PREFIX
 from pprs_dynamics.ros.live_stream import LiveStream
@@ -167,13 +167,13 @@ class LiveJointStates(Node):
             while not last - SHOWN <= self._residuals[0][0] <= last:  # stamps may go back, too
                 self._residuals.popleft()
 
-    def taken(self) -> Recording:
-        """Return what the ring holds.
+    def take(self, path: Path) -> None:
+        """Write the joint states of the ring as a recording.
 
         Raises
         ------
         PprsError
-            Where that is no recording.
+            Where they are no recording.
         """
         with self.stream.lock:
             samples = list(self._ring)
@@ -182,7 +182,7 @@ class LiveJointStates(Node):
         # Here and not above: it brings multiprocessing, which this node does without.
         from pprs_dynamics.ros.diagnosis_worker import StreamWindow
 
-        return StreamWindow.of(samples).recording('live', self.model.drives)
+        write_recording(path, StreamWindow.of(samples).recording('live', self.model.drives))
 
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""
@@ -199,6 +199,7 @@ class LiveJointStates(Node):
         return {'received': self.stream.counters['received'], 'rejected': self._rejected,
                 'drives': list(self.model.drives), 'age': age, 'kept': span,
                 'trouble': trouble, 'diagnosis': self._diagnosis,
+                'can_restore': self.owner.steps > 0,
                 'effects': list(self.model.values.get(ACTIVE, ())),
                 'error': [finite(value) for value in running],
                 'monitor_error': [finite(value) for value in self._monitor]
@@ -208,7 +209,7 @@ class LiveJointStates(Node):
                     *(values.tolist() for _, values in late[::step]), strict=True)]}
 
 
-class LiveNodes:
+class LiveNodes(LiveJointStates):
     """The node in a thread of its own, for callers of other threads.
 
     Parameters
@@ -226,40 +227,25 @@ class LiveNodes:
     def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
                  feedforward: str = 'feedforward', namespace: str = '',
                  arguments: Sequence[str] = ()) -> None:
-        self._context = Context()
-        rclpy.init(args=list(arguments), context=self._context,
+        context = Context()
+        rclpy.init(args=list(arguments), context=context,
                    signal_handler_options=SignalHandlerOptions.NO)
-        self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
-                                     context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        super().__init__(model, topic, monitor, feedforward, namespace=namespace, context=context)
+        self._served_by = SingleThreadedExecutor(context=context)
+        self._served_by.add_node(self)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
         self._thread.start()
 
     def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            return
+        with suppress(ExternalShutdownException):
+            self._served_by.spin()
 
     def close(self) -> None:
-        """End it, and leave the graph."""
-        self._executor.shutdown()
+        """Stop the thread and leave the graph."""
+        self._served_by.shutdown()
         self._thread.join(PATIENCE)
-        self._node.destroy_node()
-        self._context.try_shutdown()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return state and running errors."""
-        return {**self._node.to_dict(), 'can_restore': self._node.owner.steps > 0}
-
-    def take(self, path: Path) -> None:
-        """Write what the ring holds as a recording."""
-        write_recording(path, self._node.taken())
-
-    def machine(self) -> str:
-        """Return the machine that would be set, in words; '' where no node drives."""
-        return self._node.machine()
+        self.destroy_node()
+        self.context.try_shutdown()
 
     def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model on the node that drives, all or none, and compare with it here.
@@ -276,24 +262,24 @@ class LiveNodes:
             `is_set`, and `nodes`: the reason of each that refused, '' of each that took it.
         """
         self._check(confirmed)
-        answer = self._answer(self._node.owner.set_model(model.values))
+        answer = self._answer(self.owner.set_model(model.values))
         if answer is not None and answer.result.successful:
-            self._node.stream.use_model(self._node.with_prefix(model))
-        return self._said(answer and answer.result.successful, answer and answer.result.reason)
+            self.stream.use_model(self.with_prefix(model))
+        return self._result(answer and answer.result.successful, answer and answer.result.reason)
 
     def restore(self, confirmed: str) -> dict[str, Any]:
         """Undo the last change of the model of the node that drives; see `set_model`."""
         self._check(confirmed)
-        answer = self._answer(self._node.restoring.call_async(Trigger.Request()))
-        return self._said(answer and answer.success, answer and answer.message)
+        answer = self._answer(self.restoring.call_async(Trigger.Request()))
+        return self._result(answer and answer.success, answer and answer.message)
 
     def _answer(self, future: Future[Any]) -> Any:
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
         return future.result() if done.wait(PATIENCE) else None
 
-    def _said(self, is_set: bool | None, reason: str | None) -> dict[str, Any]:
-        return {'is_set': bool(is_set), 'nodes': {self._node.owner.name: '' if is_set else (
+    def _result(self, is_set: bool | None, reason: str | None) -> dict[str, Any]:
+        return {'is_set': bool(is_set), 'nodes': {self.owner.name: '' if is_set else (
             reason or f'has not answered within {PATIENCE:g} s')}}
 
     def _check(self, confirmed: str) -> None:

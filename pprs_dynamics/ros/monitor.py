@@ -39,7 +39,6 @@ from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
 from pprs_dynamics.ros.node.qos import EVERY_MESSAGE, LATCHED, publisher
 from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.system.plain_text import for_json
 
 try:
@@ -82,7 +81,6 @@ class MonitorNode(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
-        self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._publishers_made: list[Any] = []
         self._clocks: list[Timer] = []
@@ -179,7 +177,7 @@ class MonitorNode(ManagedNode):
         try:
             found = self._joints.at(self._settings.model, position)
         except PprsError as error:
-            self._log.warning('not drawn', f'not drawn: {error}', 5.0)
+            self.get_logger().warning(f'not drawn: {error}', throttle_duration_sec=5.0)
             return
         if found is None:
             return
@@ -301,4 +299,3 @@ class MonitorNode(ManagedNode):
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
         self._status.report('ERROR', rejection.code, rejection.text)
-        self._log.warning('rejected', f'rejected, {rejection}')

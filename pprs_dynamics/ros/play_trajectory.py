@@ -36,7 +36,6 @@ from pprs_dynamics.ros.node.parameters import (
 )
 from pprs_dynamics.ros.node.provenance import arguments_of
 from pprs_dynamics.ros.node.qos import publisher
-from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.simulation.injection import draw_motion
 
@@ -81,7 +80,6 @@ class PlayTrajectoryNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
-        self._log = ThrottledLog(self)
         joints = is_described(overrides(self))
         values = declare_node_parameters(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
@@ -128,7 +126,7 @@ class PlayTrajectoryNode(Node):
 
     def _look_at_clock(self) -> None:
         if clock_is_missing(self):
-            self._log.warning('clock', MISSING_CLOCK, 5.0)
+            self.get_logger().warning(MISSING_CLOCK, throttle_duration_sec=5.0)
 
 
 class Beats:

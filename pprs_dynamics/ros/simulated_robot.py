@@ -31,7 +31,6 @@ from pprs_dynamics.ros.node.parameters import (
 from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.plant import Plant
@@ -77,7 +76,6 @@ class SimulatedRobotNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
-        self._log = ThrottledLog(self)
         node_values = declare_node_parameters(self, PARAMETERS)
         declare_model(self, arguments_of(options))
         values = {name: value for name, value in current_values(self).items()
@@ -164,7 +162,6 @@ class SimulatedRobotNode(Node):
             self._status.report('OK', 'OK', 'following commands')
         for note in robot.notes:
             self._status.report('WARN' if note.code == 'HOLD' else 'ERROR', note.code, note.message)
-            self._log.warning('note', f'{note.code}: {note.message}')
         robot.notes.clear()
 
     def _on_command(self, take: Callable[[bytes], None], data: bytes) -> None:
@@ -173,9 +170,7 @@ class SimulatedRobotNode(Node):
             take(data)
         except PprsError as error:
             self._counters['refused'] += 1
-            reason = f'a command was refused: {error}'
-            self._status.report('ERROR', 'REFUSED', reason)
-            self._log.warning('refused', reason)
+            self._status.report('ERROR', 'REFUSED', f'a command was refused: {error}')
 
     def _take_setpoint(self, data: bytes) -> None:
         message = message_in(data, JointState)

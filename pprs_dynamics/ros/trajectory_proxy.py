@@ -49,7 +49,6 @@ from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardwar
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
@@ -73,7 +72,6 @@ class TrajectoryProxyNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
-        self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
             replace(parameter, default=SPLINE)
@@ -188,7 +186,6 @@ class TrajectoryProxyNode(Node):
         text = error.text if isinstance(error, Rejection) else str(error)
         self._counters['refused'] += 1
         self._status.report('ERROR', code, text)
-        self._log.warning('refused', f'refused, {code}: {text}')
         return f'{code}: {text}'
 
     def _aborted(self, handle: Any, error: Rejection | ControllerError, code: int) -> Any:

@@ -20,14 +20,15 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError, suggestion
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,
+    REFERENCE,
     SIZE,
     STEEPNESS,
     UNKNOWN,
@@ -36,15 +37,12 @@ from pprs_dynamics.simulation.injected_forms import (
     ahead,
     algebraic_sign,
     draw_form,
+    draw_temperatures,
     eyring,
+    read_thermometers,
     tilted,
 )
-from pprs_dynamics.simulation.platform import BALLS, HINGES, RODS, PlatformMechanism
-from pprs_dynamics.simulation.temperatures import (
-    REFERENCE,
-    draw_temperatures,
-    read_thermometers,
-)
+from pprs_dynamics.simulation.platform import PlatformMechanism
 
 RATE = 100.0  # [Hz]
 CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders

@@ -34,6 +34,7 @@ from pprs_dynamics.simulation.injected_forms import (
     UNKNOWN,
     JointMoment,
     draw_form,
+    draw_temperatures,
 )
 from pprs_dynamics.simulation.injection import (
     BODIES,
@@ -49,7 +50,6 @@ from pprs_dynamics.simulation.injection import (
     require_tool,
 )
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.temperatures import draw_temperatures
 
 LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step

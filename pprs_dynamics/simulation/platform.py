@@ -11,15 +11,13 @@ from typing import ClassVar
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, SPHERICAL
 from pprs_dynamics.simulation.export.exported_robot import described
-from pprs_dynamics.simulation.export.expressed import MJCF
+from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, MJCF
 from pprs_dynamics.simulation.export.writers import written
-
-CHAINS = (1, 2, 3)
-HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in CHAINS) for part in ('hinge', 'ball', 'rod'))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,18 +32,17 @@ class PlatformMechanism(DriveModel):
     @classmethod
     def of(cls, model: DriveModel) -> PlatformMechanism:
         """Return the mechanism of a model file, without added effects."""
-        values = model.values
-        blocks = {drive: {key: values[f'friction.drives.{key}'][d]
+        of_joints = next(effect.blocks for effect in model.effects
+                         if isinstance(effect, ModelJointFriction))
+        blocks = {drive: {key: model.values[f'friction.drives.{key}'][d]
                           for key in ('viscous', 'coulomb')} for d, drive in enumerate(DRIVES)}
-        for kind, joints in (('revolute', HINGES), ('spherical', BALLS)):
-            block = {key: values[f'friction.{kind}.{key}'] for key in ('viscous', 'coulomb')}
-            block['radius'] = values[f'friction.{kind}.diameter'] / 2
-            blocks |= dict.fromkeys(joints, block)
-        effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
+        for kind, joints in ((REVOLUTE, HINGES), (SPHERICAL, BALLS)):
+            blocks |= dict.fromkeys(joints, of_joints[kind])
+        effects: tuple[Effect, ...] = (DriveFriction(0.0, 0.0), DriveOffset(0.0),
                                        ModelJointFriction(blocks))
         robot = model.robot.as_mechanism(model.limits.strokes, model.limits.efforts)
         return cls(robot=robot, effects=effects, reversal=model.reversal, limits=model.limits,
-                   values=values)
+                   values=model.values)
 
     @cached_property
     def mjcf(self) -> str:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import codecs
+from collections.abc import Mapping
 from typing import Any
 
 # Name of the error handler for streams that are not UTF-8.
@@ -33,8 +34,13 @@ def counted(count: int, thing: str) -> str:
 
 
 def for_json(content: Any) -> Any:
-    """Return what JSON can hold: text as `displayed`, None for numbers that are not finite."""
-    if isinstance(content, dict):
+    """Return what JSON can hold: text as `displayed`, None for numbers that are not finite.
+
+    Of what has a method `to_dict` the result of that.
+    """
+    if hasattr(content, 'to_dict'):
+        return for_json(content.to_dict())
+    if isinstance(content, Mapping):
         return {displayed(key): for_json(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):
         return [for_json(value) for value in content]

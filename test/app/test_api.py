@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from single_axis import axis, axis_recording
 
 import pprs_dynamics
 from pprs_dynamics import (
     ComparisonResult,
     DriveModel,
     Excitation,
-    JointMotion,
     PprsError,
     Recording,
     UnreadableFileError,
@@ -124,23 +124,8 @@ def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
 
 def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:
     """The whole loop in Python, quickly; the notebook of the robot runs before a release."""
-    model = DriveModel.load('config/single_axis.yaml')
-    robot = DriveModel.from_parameters({**model.values, 'effects.active': ['drive_spring'],
-                         'effects.drive_spring.axis.stiffness': 300.0,
-                         'effects.drive_spring.axis.position': 0.01})
-    time = np.arange(0.0, 8.0, 0.005)
-    omega = 2 * np.pi * np.array([[0.25], [0.5], [1.0]])
-    runs = []
-    for seed in (1, 2):
-        rng = np.random.default_rng(seed)
-        phase = omega * time + rng.uniform(0, 6, (3, 1))
-        size = np.array([[0.08], [0.04], [0.015]])
-        q, q_dot, q_ddot = (one.sum(axis=0)[:, None] for one in (
-            size * np.sin(phase), size * omega * np.cos(phase),
-            -size * omega ** 2 * np.sin(phase)))
-        effort = robot.drive_forces(JointMotion(q, q_dot, q_ddot, time=time)).total
-        runs.append(Recording.from_arrays(
-            f'run_{seed}', time, q, None, effort + rng.normal(0.0, 1.0, q.shape), ('axis',)))
+    model, robot = axis(), axis({'drive_spring': {'stiffness': 300.0, 'position': 0.01}})
+    runs = [axis_recording(robot, seed) for seed in (1, 2)]
     found = pprs_dynamics.diagnose(model, runs[0])
     assert [one.name for one in found.effects] == ['drive_spring']
     answer = adopt(model, 'drive_spring', runs[0], runs[1])

@@ -6,13 +6,16 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made_up_recordings import judged, measured
 from pprs_command import pprs
 
 from pprs_dynamics.app.commands.pprs import COMMANDS
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import write_recording
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -31,6 +34,9 @@ MISTAKES = {
     'compare binary.csv': 'binary.csv: ',
     'diagnose': 'RECORDING',
     'diagnose run.csv --validate run.csv': TWICE,
+    'diagnose run.csv --validate silent.csv': 'silent.csv: no effort of any drive',
+    'diagnose run.csv --validate few.csv': 'few.csv: none of its 3 samples can be used',
+    'compare silent.csv': 'silent.csv: no effort of any drive',
     'diagnose run.csv --adopt-all': '--adopt-all: no --output FILE is given',
     'diagnose run.csv --output x.yaml': '--output: it is given without --adopt-all',
     'diagnose run.csv --adopt-all --output x.yaml --refit --reference':
@@ -38,7 +44,8 @@ MISTAKES = {
     'diagnose run.csv --model nowhere.yaml': 'nowhere.yaml: no such file',
     'export --output x.txt --model model.yaml': ENDS,
     'fit nowhere.csv --output x.yaml': 'nowhere.csv: No such file',
-    'history model.yaml --undo': 'be given with --undo, and only then',
+    'history model.yaml --undo': '--undo: no --output FILE is given',
+    'history model.yaml --output x.yaml': '--output: it is given without --undo',
     'history model.yaml --undo --output model.yaml': 'must be another file',
     'info run.csv --json x.txt': ENDS + '.json',
     'init nowhere.urdf run.csv --output x.yaml': 'nowhere.urdf',
@@ -62,6 +69,10 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('mistakes')
     write_recording(folder / 'run.csv', judged(measured(200)))
     (folder / 'empty.csv').write_text('')
+    lines = (folder / 'run.csv').read_text().splitlines()
+    (folder / 'few.csv').write_text('\n'.join(lines[:4]))
+    write_recording(folder / 'silent.csv', replace(
+        judged(measured(300)), effort=np.full((300, len(DRIVES)), np.nan)))
     (folder / 'short.csv').write_text('time,a\n1,2\n')
     (folder / 'binary.csv').write_bytes(bytes(range(256)) * 20)
     shutil.copy(CONFIG / 'paper.yaml', folder / 'model.yaml')

@@ -79,7 +79,7 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     assert min(terms.total for terms in shown.without.values()) > 100
     told = next(one for one in session.to_dict()['effects'] if one['name'] == 'payload_mass')
     assert told['evidence'] == pytest.approx(shown.without['payload_mass'].total)
-    assert told['evidence_terms'].startswith('fit + ')
+    assert told['evidence_terms'].startswith('fit +')
     # Noise is shown once the diagnosis has estimated it.
     assert math.isnan(session.errors()['lift_2'].noise)
 

@@ -17,8 +17,7 @@ from pprs_command import pprs
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+from pprs_dynamics.inference.adoption.adoption import Adoption, LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pprs_dynamics.inference.diagnosis.comparison import compare
-from pprs_dynamics.inference.diagnosis.localisation import Localisation
+from pprs_dynamics.inference.diagnosis.comparison import Localisation, compare
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.profiles import error_profile

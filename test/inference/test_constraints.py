@@ -175,6 +175,3 @@ def test_a_body_of_which_the_fit_says_nothing_is_any(robot: Mechanism) -> None:
     added, remaining = least_extents(robot, component, found)
     assert added > -1e-6
     assert remaining > -1e-6
-
-
-# Totals of a drive.

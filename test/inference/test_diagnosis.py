@@ -12,7 +12,7 @@ import pytest
 from model_recordings import TIME, record
 
 from benchmarks.hidden.recordings import Case, make_case
-from pprs_dynamics import DriveModel, simulate
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -24,7 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 
 MODEL = DriveModel.load()
@@ -130,29 +130,6 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
                                        expected[:, d], atol=0.02 * np.abs(expected).max())
 
 
-def test_the_catalogues_own_form_is_found_with_its_values_and_to_the_noise() -> None:
-    true = DriveModel.from_parameters(
-        {**MODEL.values, 'effects.active': ['stribeck_friction', 'payload_mass'],
-                        'effects.stribeck_friction.lift_1.force': 0.6,
-                        'effects.stribeck_friction.lift_1.velocity': 0.02,
-                        'effects.payload_mass.mass': 0.25})
-    found = diagnose(MODEL, [record(true, 0.08)])
-    assert {one.name for one in found.effects} == {'stribeck_friction', 'payload_mass'}
-    by_name = {one.name: one for one in found.effects}
-    assert by_name['stribeck_friction'].drives == ('lift_1',)
-    for name, key, value in (('stribeck_friction', 'lift_1.force', 0.6),
-                             ('stribeck_friction', 'lift_1.velocity', 0.02),
-                             ('payload_mass', 'mass', 0.25)):
-        estimate = by_name[name].parameters[key]
-        assert abs(estimate.value - value) < 4 * estimate.std < 0.5 * value
-    # The model that is handed on explains the recording as far as the fit does.
-    left, _ = measure_residuals(found.adopted, [record(true, 0.08)])
-    rms = float(np.sqrt(np.nanmean(left.error ** 2)))
-    assert rms == pytest.approx(found.effects[-1].error_after, rel=0.02)
-    assert rms < 1.03 * found.noise_floor
-    assert rms < found.effects[0].error_before / 3
-
-
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['base_tilt'],
                         'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
@@ -191,28 +168,6 @@ def case(row: str, *effects: str, seed: int = 3, snr: float = 1.0, noise: float 
          ) -> tuple[Diagnosis, dict]:
     model, recording, truth = make_case(Case(row, effects, seed, snr, noise))
     return diagnose(model, [recording]), truth
-
-
-@pytest.mark.parametrize('name', [
-    'force_ripple', 'joint_friction', pytest.param('hysteresis', marks=pytest.mark.slow),
-    pytest.param('time_delay', marks=pytest.mark.slow),
-    pytest.param('payload_offset', marks=pytest.mark.slow)])
-def test_a_hidden_effect_is_named(name: str) -> None:
-    found, truth = case('effects', name)
-    named = [one.name for one in found.effects]
-    in_set = [names for names in found.indistinguishable if name in names]
-    assert named[:1] == [name] or in_set
-    if named[:1] == [name] and truth['effects'][0]['drives'] is not None:
-        assert set(found.effects[0].drives or ()) == set(truth['effects'][0]['drives'])
-    assert found.effects[0].error_after < found.effects[0].error_before
-
-
-@pytest.mark.slow
-def test_what_reversals_leave_of_another_form_is_no_delay() -> None:
-    """The recording of the README: exponential Stribeck friction, sampled at 500 Hz."""
-    found = diagnose(MODEL, [simulate(MODEL, 'stribeck_friction', seed=2).recording])
-    assert [(one.name, one.drives) for one in found.effects] == [
-        ('stribeck_friction', ('slide_1',))]
 
 
 @pytest.mark.parametrize('noise', [

@@ -17,7 +17,7 @@ from pprs_dynamics.app.fleet.store import AUTO
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis

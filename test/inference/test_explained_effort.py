@@ -38,7 +38,7 @@ def test_compare_says_first_that_a_model_explains_little(tmp_path: Path) -> None
     found = compare(model, unrelated(model))
     share = found.comparison.drives['turn'].explained_variance
     assert share < 0.5
-    assert found.verdict.startswith('the model explains')
+    assert found.verdict.startswith('The model explains')
     assert 'of the effort of turn' in found.verdict
     assert found.comparison.drives['turn'].grade == 'poor'
     assert 'accounts for' not in found.verdict

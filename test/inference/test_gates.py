@@ -142,6 +142,3 @@ def test_a_drive_counts_from_a_hundred_samples_on(samples: int) -> None:
     error[:samples] = np.random.default_rng(2).normal(size=(samples, 1))
     found = predictive_gain(residuals_of(error), residuals_of(0.5 * error))
     assert bool(found.gains.sum() > 0) is (samples == 100)
-
-
-# --- lack of fit ----------------------------------------------------------------------------------

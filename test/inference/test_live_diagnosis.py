@@ -6,62 +6,39 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from single_axis import AXIS
+from single_axis import AXIS, axis, axis_recording
 
-from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis, change_point
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 
-RATE, LENGTH = 100.0, 20.0  # [Hz, s]
+LENGTH = 20.0  # [s]
 SPRING = 300.0  # [N/m] that the model lacks
-NOISE = 1.0  # [N]
 SOONER = 8.0  # [s] within the second window
+WORN = axis({'drive_spring': {'stiffness': SPRING, 'position': 0.01}})
 
 
-def window(model: DriveModel, worn: DriveModel, number: int, begins: float = 0.0,
-           ) -> Recording:
+def window(worn: DriveModel, number: int, begins: float = 0.0) -> Recording:
     """Return efforts of one axis before a moment [s] and of a worn one after it."""
-    time = np.arange(0, LENGTH, 1 / RATE)
-    omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]
-    phase = omega * time + np.random.default_rng(number).uniform(0, 2 * np.pi, (3, 1))
-    size = np.array([0.08, 0.04, 0.015])[:, None]
-    motion = JointMotion((size * np.sin(phase)).sum(axis=0)[:, None],
-                         (size * omega * np.cos(phase)).sum(axis=0)[:, None],
-                         (-size * omega ** 2 * np.sin(phase)).sum(axis=0)[:, None], time=time)
-    effort = np.where((time < begins)[:, None], model.drive_forces(motion).total,
-                      worn.drive_forces(motion).total)
-    noise = NOISE * np.random.default_rng(number).standard_normal(effort.shape)
-    return Recording.from_arrays(f'window {number}', time, motion.position,
-                                 effort=effort + noise, drives=(AXIS,))
-
-
-def axis(**values: Any) -> DriveModel:
-    model = DriveModel.from_parameters(
-        {**DriveModel.load('config/single_axis.yaml').values, **values})
-    return model
-
-
-WORN = {'effects.active': ['drive_spring'], 'effects.drive_spring.axis.stiffness': SPRING,
-        'effects.drive_spring.axis.position': 0.01}
+    return axis_recording(worn, number, 1.0, axis(), begins, np.arange(0, LENGTH, 0.01))
 
 
 def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_after() -> None:
-    model, worn = axis(), axis(**WORN)
+    model = axis()
     live = LiveDiagnosis(model)
-    live = live.with_window(window(model, model, 0), 0.0)
+    live = live.with_window(window(axis(), 0), 0.0)
     assert live.effects == ()
-    live = live.with_window(window(model, worn, 1, SOONER), LENGTH)
+    live = live.with_window(window(WORN, 1, SOONER), LENGTH)
     assert live.claimed == ()  # named by one window only
     assert live.adopted() == {}
-    live = live.with_window(window(model, worn, 2), 2 * LENGTH)
-    live = live.with_window(window(model, worn, 3), 3 * LENGTH)
+    live = live.with_window(window(WORN, 2), 2 * LENGTH)
+    live = live.with_window(window(WORN, 3), 3 * LENGTH)
     assert [effect.found.name for effect in live.claimed] == ['drive_spring']
     assert live.claimed[0].since == pytest.approx(LENGTH + SOONER, abs=1.0)
     found = live.claimed[0].found.parameters['axis.stiffness']
@@ -71,14 +48,14 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     assert adopted.values['effects.drive_spring.axis.stiffness'] == found.value
     beside = replace(live, effects=(*live.effects, replace(live.claimed[0], confirmed=False)))
     assert beside.adopted() == {}  # the numbers were fitted together
-    live = live.with_window(window(model, model, 4), 4 * LENGTH)
+    live = live.with_window(window(axis(), 4), 4 * LENGTH)
     assert live.claimed == ()
     assert [effect.found.name for effect in live.withdrawn] == ['drive_spring']
 
 
 def test_a_robot_that_stands_is_not_diagnosed() -> None:
     model = axis()
-    moving = window(model, axis(**WORN), 1)
+    moving = window(WORN, 1)
     encoder = 1e-6 * np.random.default_rng(0).integers(-1, 2, moving.position.shape)
     standing = Recording.from_arrays(
         'standing', moving.time, moving.position[:1] + encoder, effort=moving.effort,

@@ -11,15 +11,18 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
-from pprs_dynamics.inference.experiments.criteria import Information, whitened
+from pprs_dynamics.inference.experiments.information import (
+    FittedTerm,
+    Information,
+    whitened,
+)
 from pprs_dynamics.inference.experiments.motion_design import (
+    MotionLimits,
     Motions,
     NoMotionError,
     platform_motion,
 )
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import PurposeError, next_experiment
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
@@ -32,7 +35,7 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.robot import condition_number
@@ -128,18 +131,18 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     white[:, 0] = 0.05 ** 2
     fit = regression.at((), white)
     motion = platform_motion(series, design.recordings[0].time)
-    plan = ColumnPlan.of(design.given, design.model, design.model.drive_forces(motion),
-                         motion.time, TERMS)
-    information = Information(plan, regression.noise(fit))
+    information = Information.of(design.given, design.model, design.model.drive_forces(motion),
+                                 motion.time, TERMS, regression.noise(fit))
     known = information.of_recordings(design, regression, fit) - information.prior()
     # Smoothing drops half a window at either end, and the transform a few samples more.
     time = design.recordings[0].time[:5 * len(regression.series[0])]
-    planned = plan.on_motion(plan.model.drive_forces(platform_motion(series, time)), time, 5)
+    planned = information.on_motion(information.model.drive_forces(
+        platform_motion(series, time)), time, 5)
     told = information.of_motion(planned, len(time) * 0.002)
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
-    assert {type(one) for one in plan.base} == {
+    assert {type(one) for one in information.base} == {
         ModelNumber, ReversalShape, PresentCoefficient, PresentShape}
 
 
@@ -148,9 +151,6 @@ def test_white_noise_counts_samples() -> None:
     wave = np.cos(2 * np.pi * 3 * np.arange(40) / 40)
     # 1000 samples of mean square 1/2 over a variance of 1/4.
     assert np.sum(whitened(wave, noise, 10.0) ** 2) == pytest.approx(2000)
-
-
-# Criteria.
 
 
 # Limits and search.
@@ -195,6 +195,3 @@ def test_no_room_is_said(model: DriveModel) -> None:
 def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
     with pytest.raises(PurposeError, match='no recording is given'):
         next_experiment(model)
-
-
-# The command.

@@ -110,16 +110,6 @@ def test_a_vibration_is_no_noise() -> None:
     assert power < 0.01 * 4000 * 0.9 ** 2 / 6
 
 
-def test_a_constant_takes_no_part_in_the_fit() -> None:
-    rng = np.random.default_rng(6)
-    noise = ar1(0.9, 4000, rng)[:, None]
-    _, without = fitted(noise)
-    _, beside = fitted(noise + 5.0)
-    spectra = [fit.spectra[0, 1:] for fit in (without, beside)]
-    np.testing.assert_allclose(spectra[1], spectra[0], rtol=0.05)
-    assert beside.deviance > without.deviance + 1000
-
-
 def test_the_rms_is_that_of_the_spectrum() -> None:
     noise = NoiseSpectrum(np.array([0.5, 4.0]), np.array([0.3, 40.0, 2.0]), PERIOD)
     frequency = (np.arange(200_000) + 0.5) / 200_000 * 0.5 / PERIOD
@@ -204,15 +194,6 @@ def test_a_constant_of_noise_seldom_stands_out(settings: NoiseSettings, most: fl
     assert np.mean(beyond) <= most
 
 
-def test_noise_of_the_benchmarks_has_the_stated_covariance() -> None:
-    lags = np.array([0, 1, 3, 10])
-    source = EffortNoise(NoiseSettings(0.05, 0.06, 0.8, pink=0.02), np.random.default_rng(5))
-    samples = source.samples(200_000)
-    samples -= samples.mean(axis=0)
-    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
-    np.testing.assert_allclose(found, source.autocovariance(lags), atol=2e-4)
-
-
 def test_a_drive_without_any_noise_has_finite_noise() -> None:
     shapes = NoiseShapes.of(FrequencyBands.of(20.0, PERIOD))
     bands = shapes.at_bands.shape[1]
@@ -223,18 +204,3 @@ def test_a_drive_without_any_noise_has_finite_noise() -> None:
         weights = 1 / (found @ shapes.at_bands) ** 2
     assert np.isfinite(weights).all()
     assert (found > 0).all()
-
-
-def test_the_noise_of_a_constant_is_that_of_its_own_drive() -> None:
-    """White peers do not make offsets of the slow noise of one drive."""
-    random = np.random.default_rng(5)
-    beyond = 0
-    for _ in range(40):
-        slow = lfilter([np.sqrt(1 - 0.998 ** 2)], [1, -0.998], random.normal(size=10000))[-2000:]
-        errors = np.column_stack([slow, *random.normal(size=(5, 2000))])
-        regression = Regression(Residuals(
-            tuple('abcdef'), 0.02 * np.arange(2000), np.zeros(2000, int), errors,
-            np.zeros_like(errors)))
-        fit = regression.fit(())
-        beyond += int(fit.squares[0, 0] > 9 * fit.spectra[0, 0])
-    assert beyond <= 1

@@ -61,16 +61,6 @@ def test_what_a_model_lacks_is_no_noise(tmp_path: Path) -> None:
         assert loaded[name].grade != 'noise'
 
 
-def test_a_vibration_that_compare_names_is_no_noise(tmp_path: Path) -> None:
-    model = real_arm(tmp_path)
-    made = record(model, motion(), NOISE)
-    shaken = made.effort + np.array([0.0, 3.0, 0.0]) * np.sin(
-        2 * np.pi * 6.1 * made.time)[:, None]
-    found = compare(model, replace(made, effort=shaken)).comparison.drives
-    quiet = compare(model, made).comparison.drives
-    assert found['swing'].noise_floor == pytest.approx(quiet['swing'].noise_floor, rel=0.3)
-
-
 def test_a_noise_that_cannot_be_told_is_not_printed(tmp_path: Path) -> None:
     model = real_arm(tmp_path)
     found = compare(model, record(model, motion(0.9), NOISE)).comparison

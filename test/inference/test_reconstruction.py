@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from random_states import inverse_kinematics, paper_model
-from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
@@ -42,27 +40,10 @@ class Truth:
     force: np.ndarray
 
 
-def motion_from_poses(path, time):
-    """Return a path's motion with rates by central differences of its poses.
-
-    However the path differentiates itself, this is the motion that its poses make.
-    """
-    h = 1e-3
-    around = {k: path.motion(time + k * h) for k in (-2, -1, 0, 1, 2)}
-    back = Rotation.from_quat(np.array(around[0].orientation)).inv()
-    x = {k: np.concatenate((pose.position, (Rotation.from_quat(
-        np.array(pose.orientation)) * back).as_rotvec()), axis=1) for k, pose in around.items()}
-    first = (8 * (x[1] - x[-1]) - (x[2] - x[-2])) / (12 * h)
-    # Of rotation vectors about the pose itself, derivatives are omega and epsilon.
-    second = (16 * (x[1] + x[-1]) - (x[2] + x[-2]) - 30 * x[0]) / (12 * h * h)
-    return PlatformMotion(around[0].position, around[0].orientation, first[:, :3], first[:, 3:],
-                          second[:, :3], second[:, 3:], time)
-
-
 def truth_at(time, frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
     """Return what the paper's robot does and needs at times within 0..DURATION."""
     path = Excitation(DURATION + 1, seed, amplitude, tilt, frequency)
-    motion = motion_from_poses(path, np.asarray(time) + 0.5)
+    motion = path.motion(np.asarray(time) + 0.5)
     return Truth(np.asarray(time), inverse_kinematics(MODEL.robot.geometry, motion),
                  MODEL.drive_forces(motion).total)
 
@@ -130,7 +111,6 @@ def test_local_polynomials_are_exact_for_polynomials_of_their_order(window):
 def test_reconstruction_alone_costs_less_than_5_mN_on_every_drive(motion):
     real = truth(*motion)
     error = rms(force_error(recording_of(real)))
-    print(f'{motion}: {1e3 * error.max():.2f} mN of {rms(real.force).min():.1f} N')
     assert np.all(error < FORCE_ERROR)
 
 
@@ -286,15 +266,9 @@ def test_lost_samples_are_bridged_in_positions_and_stay_unknown_in_efforts():
 VELOCITIES = {
     # name: (velocity from the truth, whether velocities and accelerations are better so)
     'exact': (lambda real, rng: real.velocity, (True, True)),
-    # The window leaves 2.5 um/s and 1.4e-4 m/s^2 of differentiated positions; of these noises a
-    # fifth, and 8.5 times them as accelerations.
-    'noise of 2 um/s': (
-        lambda real, rng: real.velocity + rng.normal(scale=2e-6, size=real.velocity.shape),
-        (True, True)),
     'noise of 60 um/s': (
         lambda real, rng: real.velocity + rng.normal(scale=6e-5, size=real.velocity.shape),
         (False, False)),
-    'one sample late': (lambda real, rng: np.roll(real.velocity, 1, axis=0), (False, False)),
     'differences of the encoder': (
         lambda real, rng: np.diff(encoder(real.position), axis=0, prepend=0) / STEP,
         (False, False)),
@@ -364,21 +338,6 @@ def test_live_and_offline_agree_to_rounding_across_a_gap():
     offline = np.concatenate((found.treat(found.effort), found.treat(found.velocity)), axis=1)
     assert_allclose(blocks, offline, rtol=0, atol=1e-11)
     assert np.isnan(blocks).sum() == 1
-
-
-def test_live_bridges_a_position_that_is_none_and_starts_again_after_three():
-    polynomial = LocalPolynomial(17, STEP)
-    live = LiveReconstruction(polynomial)
-    for k in range(80):
-        q = np.full(6, np.nan) if k in (20, 50, 51, 52) else np.full(6, 0.1 * k)
-        sample = live.push(k * STEP, q, np.zeros(6))
-        # Neither the missing one is answered, nor the one that would have been with it: 12, 20.
-        answered = (16 <= k < 50 and k not in (20, 28)) or k >= 53 + 16
-        assert (sample is not None) == answered, k
-        if sample is not None:
-            assert_allclose(sample.velocity, 0.1 / STEP, rtol=1e-9)
-            assert sample.time == pytest.approx((k - 8) * STEP)
-    assert (live.gaps, live.bridged) == (1, 1)
 
 
 @pytest.mark.parametrize('late', [False, True])

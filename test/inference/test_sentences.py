@@ -25,8 +25,11 @@ from rich.console import Console
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import _parser
+from pprs_dynamics.app.report.adoption_report import run_view
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
+from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
@@ -117,6 +120,21 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     assert "--model 'my robot.yaml' --topic /arm/joint_states" in command
     words = shlex.split(command)[1:]
     assert _parser(words).parse_args(words).topic == '/arm/joint_states'
+
+
+@pytest.mark.parametrize('count', [0, 1, 2])
+def test_an_unexplained_error_is_recorded_again_before_anything_is_adopted(count: int) -> None:
+    effects = (found_effect('coulomb_friction'), found_effect('time_delay'))[:count]
+    open_ = made_up_diagnosis('unknown', effects=effects, above_noise={'lift_2': 3.0})
+    following, command = next_step(open_, GivenFiles(('a.csv',)))
+    assert following.startswith('Repeat the motion')
+    assert command.startswith('pprs diagnose a.csv SECOND_RECORDING')
+
+
+def test_a_run_that_ends_ambiguous_names_the_files_of_the_next_command() -> None:
+    run = AdoptionRun((), 'ambiguous', 'base_tilt explains them as well', DriveModel.load())
+    command = GivenFiles(('a.csv',)).command('next-experiment', '--output', 'next.csv')
+    assert command in in_one_line(as_text(run_view(run, command), 200))
 
 
 def test_commands_say_whose_robot_the_model_is() -> None:

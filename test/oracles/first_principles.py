@@ -68,33 +68,6 @@ def drive_motion(geometry, motion):
                  for x in (C, v_C))
 
 
-def energy(robot, motion):
-    """Return kinetic and potential energy of all bodies, (N,) each [J]."""
-    geometry, masses, g = robot.geometry, robot.masses, np.asarray(robot.gravity)
-    _, n = chain_vectors(geometry)
-    A, v_A, C, v_C = rod_ends(geometry, motion)
-    rotation = Rotation.from_quat(motion.orientation).as_matrix()
-    d = rotation @ np.asarray(masses.centre)
-    omega = motion.angular_velocity
-    v_centre = motion.linear_velocity + np.cross(omega, d)
-    xx, yy, zz, xy, xz, yz = masses.inertia
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    local = np.einsum('nji,nj->ni', rotation, omega)
-    M = masses.platform + masses.payload
-    kinetic = (M * np.sum(v_centre ** 2, axis=1)
-               + np.einsum('ni,ij,nj->n', local, tensor, local)) / 2
-    potential = -M * (motion.position + d) @ g
-
-    slides, lifts, rods = (np.asarray(m) for m in (masses.slides, masses.lifts, masses.rods))
-    v_slide = np.einsum('nij,ij->ni', v_C, n)
-    kinetic += (v_slide ** 2 @ slides + np.sum(v_C ** 2, axis=-1) @ lifts) / 2
-    # A thin rod between two points: m/6 (v_A^2 + v_A . v_C + v_C^2).
-    kinetic += np.sum(v_A * v_A + v_A * v_C + v_C * v_C, axis=-1) @ rods / 6
-    slide_place = C - C[..., 2:] * UP
-    potential -= ((slide_place @ g) @ slides + (C @ g) @ lifts + ((A + C) / 2 @ g) @ rods)
-    return kinetic, potential
-
-
 def moved(motion, change):
     """Return a pose displaced by a small twist: translation and turn in the base frame."""
     from pprs_dynamics import PlatformMotion

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics.physics.mechanism.drive_path import DrivePath
+from pprs_dynamics.physics.mechanism.joint_motion import DrivePath
 
 TIME = np.arange(0.0, 1.001, 0.02)
 

@@ -13,7 +13,6 @@ from oracles.first_principles import (
     central_difference,
     chain_vectors,
     drive_motion,
-    energy,
     moved,
 )
 from random_states import (
@@ -26,7 +25,6 @@ from random_states import (
     random_robot,
     smooth_motion,
 )
-from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import MotionError, PprsError, SingularityError
@@ -36,7 +34,6 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 # operations; a wrong term shows at 1e-3 or more.
 ROUNDING = 1e-11
 # A fourth-order difference over 1e-3 s of motions of a few rad/s.
-DIFFERENCE_TOLERANCE = 1e-8
 OBLIQUE = (3.0, -4.0, -8.0)
 PRINTED = {'equations': 'printed'}
 INDEPENDENT = {'friction.approach': 'independent_chains'}
@@ -70,62 +67,7 @@ def reactions_on_platform(robot, forces):
     return loads_of_joints(robot, forces)[1].F
 
 
-def inertia_in_base(robot, motion):
-    rotation = Rotation.from_quat(motion.orientation).as_matrix()
-    return rotation @ robot.masses.inertia_tensor @ np.swapaxes(rotation, 1, 2)
-
-
-# Energy and statics --------------------------------------------------------------------------
-
-def test_power_of_frictionless_forces_is_the_rate_of_energy(robot):
-    t, h = np.linspace(0, 6, 150), 1e-3
-    elbow = robot.geometry.elbow
-    forces = model_of(robot).drive_forces(smooth_motion(t, elbow))
-    E = {k: sum(energy(robot, smooth_motion(t + k * h, elbow))) for k in (-2, -1, 1, 2)}
-    rate = (8 * (E[1] - E[-1]) - (E[2] - E[-2])) / (12 * h)
-    delivered = np.sum(drive_motion(robot.geometry, smooth_motion(t, elbow))[1]
-                       * forces.parts['rigid_body'], axis=1)
-    assert_allclose(delivered, rate, rtol=0, atol=DIFFERENCE_TOLERANCE)
-    kinetic = energy(robot, smooth_motion(t, elbow))[0]
-    assert np.ptp(kinetic) > 0.05  # kinetic and potential energy both matter here
-    assert np.abs(rate).max() > 1
-
-
-@pytest.mark.parametrize('seed', range(1))
-def test_force_at_rest_is_the_gradient_of_potential_energy(robot, seed):
-    states = random_motion(np.random.default_rng([53, seed]), 1, robot.geometry.elbow)
-    pose = PlatformMotion.at_rest(states.position, states.orientation)
-    force = model_of(robot).drive_forces(pose).parts['rigid_body'][0]
-    gradient = central_difference(lambda x: energy(robot, moved(pose, x))[1][0], 6)
-    drives = central_difference(
-        lambda x: drive_motion(robot.geometry, moved(pose, x))[0][0], 6)
-    assert_allclose(drives.T @ force, gradient, rtol=0, atol=DIFFERENCE_TOLERANCE)
-
-
-# Symmetry ------------------------------------------------------------------------------------
-
-
 # Reactions -----------------------------------------------------------------------------------
-
-def test_reactions_satisfy_the_platforms_newton_euler_equations(robot, motion):
-    forces = model_of(robot).drive_forces(motion)
-    on_platform = reactions_on_platform(robot, forces)
-    omega, epsilon = motion.angular_velocity, motion.angular_acceleration
-    rotation = Rotation.from_quat(motion.orientation)
-    d = rotation.apply(robot.masses.centre)
-    arms = np.stack([rotation.apply(robot.geometry.platform_radius * np.array(
-        [np.cos(angle), np.sin(angle), 0])) for angle in robot.geometry.platform_angles], axis=1)
-    a_centre = (motion.linear_acceleration + np.cross(epsilon, d)
-                + np.cross(omega, np.cross(omega, d)))
-    assert_allclose(on_platform.sum(axis=1) + robot.masses.total * np.asarray(robot.gravity),
-                    robot.masses.total * a_centre, rtol=0, atol=ROUNDING)
-    # Euler's equation about the centre of mass, not about o as in the package.
-    tensor = inertia_in_base(robot, motion)
-    spin = np.einsum('nij,nj->ni', tensor, omega)
-    moment = np.cross(arms - d[:, None], on_platform).sum(axis=1)
-    assert_allclose(moment, np.einsum('nij,nj->ni', tensor, epsilon) + np.cross(omega, spin),
-                    rtol=0, atol=ROUNDING)
-
 
 def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = model_of(robot).drive_forces(motion)

@@ -17,7 +17,7 @@ from feedforward_bench import random_motion
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
-from pprs_dynamics.physics.effects.foreign_effects import check_columns
+from pprs_dynamics.physics.effects.catalogue import check_columns
 
 ONE = random_motion(np.random.default_rng(11), 3)[:1]
 

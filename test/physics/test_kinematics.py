@@ -17,10 +17,8 @@ from random_states import (
     inverse_kinematics,
     paper_geometry,
     paper_model,
-    random_motion,
     random_poses,
     random_robot,
-    smooth_motion,
 )
 from scipy.optimize import brentq, root
 from scipy.spatial.transform import Rotation
@@ -76,15 +74,6 @@ def home_determinant(geometry):
 
 
 # Inverse and forward -------------------------------------------------------------------------
-
-def test_inverse_kinematics_satisfies_the_closure_equations(geometry):
-    motion = random_motion(np.random.default_rng(1), 200, geometry.elbow)
-    q = inverse_kinematics(geometry, motion).position
-    for sample in range(len(motion)):
-        gap = closure(geometry, q[sample], motion.position[sample],
-                      rotation_vector(motion[sample]))
-        assert np.abs(gap).max() < 1e-15
-
 
 @every_elbow
 @pytest.mark.parametrize('robot', ['paper', 'unequal'])
@@ -182,29 +171,6 @@ def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
     q = inverse_kinematics(geometry, pose).position
     found = forward(geometry, q)
     assert_allclose(found.position, pose.position, rtol=0, atol=1e-9)
-
-
-# Rates ---------------------------------------------------------------------------------------
-
-def test_velocities_and_accelerations_are_derivatives_of_positions(geometry):
-    t, h = np.linspace(0, 6, 200), 1e-3
-    middle = inverse_kinematics(geometry, smooth_motion(t, geometry.elbow))
-    around = {k: inverse_kinematics(geometry, smooth_motion(t + k * h, geometry.elbow))
-              for k in (-2, -1, 1, 2)}
-
-    def first(name):
-        f = {k: getattr(chains, name) for k, chains in around.items()}
-        return (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12 * h)
-
-    # O(h^4) of motions of a few rad/s, and rounding 1e-16 / h.
-    assert_allclose(middle.velocity, first('position'), rtol=0, atol=1e-9)
-    assert_allclose(middle.u_dot, first('rod_angle'), rtol=0, atol=1e-9)
-    assert_allclose(middle.acceleration, first('velocity'), rtol=0, atol=1e-8)
-    assert_allclose(middle.u_ddot, first('u_dot'), rtol=0, atol=1e-8)
-    assert np.abs(middle.u_ddot).max() > 0.5
-
-
-# Jacobians -----------------------------------------------------------------------------------
 
 
 # Out of reach and singular -------------------------------------------------------------------

@@ -72,20 +72,6 @@ def test_viscous_friction_of_passive_joints_is_the_engines(states, answers, engi
     assert_allclose(states[2].parts['passive_friction'], oracle, rtol=0, atol=FORCE_TOLERANCE)
 
 
-@every_engine
-@every_elbow
-def test_forces_of_many_different_robots_are_the_engines(engine, elbow):
-    rng = np.random.default_rng([7, ELBOWS.index(elbow)])
-    for _ in range(20):
-        robot = random_robot(rng, elbow, rng.uniform(-10, 10, 3))
-        motion = random_motion(rng, 5, elbow)
-        forces = model_of(robot, VISCOUS_ONLY).drive_forces(motion)
-        oracle = engine(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
-        assert_allclose(forces.parts['rigid_body'], oracle.force, rtol=0, atol=FORCE_TOLERANCE)
-        assert_allclose(forces.parts['passive_friction'], oracle.passive, rtol=0,
-                        atol=FORCE_TOLERANCE)
-
-
 # The errors of (7) and (12) as printed, on states of this kind: both would be caught above.
 
 @every_elbow

@@ -26,7 +26,7 @@ from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
-from pprs_dynamics.physics.mechanism.places import PLATFORM
+from pprs_dynamics.physics.mechanism.state import PLATFORM
 
 EFFECTS = {name: paper_model().bound(effect) for name, effect in CATALOGUE.items()
            if issubclass(effect, StructureEffect) and PLATFORM in effect.acts_in}

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism import tree_evaluation
+from pprs_dynamics.physics.mechanism import evaluation
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 
 SAMPLES = 30
@@ -62,21 +62,21 @@ def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize('name', ['hexapod', 'five_bar'])
-def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
-                                              monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_without_a_compiler_is_the_same(tmp_path: Path, name: str,
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
     structure = DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure
     joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
               for one in structure.friction_rows}
     model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
-    motion = states(model, SIZES[name])
+    motion = states(model, SIZES[name])[:8]
     compiled = model.drive_forces(motion).parts
-    monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
-    on_arrays, on_floats = (model.drive_forces(motion[part]).parts
-                            for part in (slice(None), slice(3, 5)))
-    assert set(on_arrays) == set(compiled)
+    monkeypatch.setattr(evaluation, '_compiled', {})
+    with evaluation.not_compiling_yet():
+        plain = model.drive_forces(motion).parts
+    assert not evaluation._compiled
+    assert set(plain) == set(compiled)
     for part, values in compiled.items():
-        assert on_arrays[part] == pytest.approx(values, abs=1e-9), part
-        assert on_floats[part] == pytest.approx(values[3:5], abs=1e-9), part
+        assert plain[part] == pytest.approx(values, abs=1e-9), part
 
 
 WANDER = {'hexapod': 0.05, 'delta': 0.6, 'five_bar': 0.9}
@@ -331,15 +331,12 @@ def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None
             (np.sum(x_dot ** 2 + x * x_ddot, axis=1) - rate ** 2) / length, abs=1e-10)
 
 
-@pytest.mark.parametrize('compiled', [True, False])
 @pytest.mark.parametrize('samples', [1, 8])
 def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same_legs(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, compiled: bool) -> None:
+        tmp_path: Path, samples: int) -> None:
     model = DriveModel.load(robots.hexapod().write(tmp_path))
     home = model.robot.tool_pose.home
     turned = (Rotation.from_matrix(home.R) * Rotation.from_rotvec([0.0, 0.0, 1.7])).as_quat()
-    if not compiled:
-        monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
     with pytest.raises(SingularityError):
         model.drive_forces(PlatformMotion.at_rest(np.tile(home.p, (samples, 1)),
                                                   np.tile(turned, (samples, 1))))

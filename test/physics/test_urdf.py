@@ -1,19 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What URDFs hold beside a tree: closures, gears, xacro, packages, and bodies that cannot be."""
+"""What URDFs hold beside a tree: gears, xacro, packages, and bodies that cannot be."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import made_up_arm as arm
-import numpy as np
 import pytest
-import robots_with_loops as robots
 
-from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.description import Description
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
 
@@ -41,72 +39,9 @@ def test_bodies_that_cannot_be_are_told_and_those_that_can_are_not(tmp_path: Pat
     assert '0.08 kg m^2' in millimetres
 
 
-def as_constraints(text: robots.RobotText, folder: Path) -> Path:
-    """Write a robot whose loops stand in its URDF."""
-    for name, loop in text.loops.items():
-        sides = ''.join(
-            f'<{side} link="{loop[of]["link"]}"/>'
-            f'<{side}_origin xyz="{robots.words(loop[of]["xyz"])}" '
-            f'rpy="{robots.words(loop[of].get("rpy", (0, 0, 0)))}"/>'
-            f'<{side}_axis xyz="0 0 1"/>' for side, of in (('parent', 'a'), ('child', 'b')))
-        text.parts.append(f'<constraint name="{name}" type="{loop["type"]}">{sides}</constraint>')
-    text.loops = {}
-    return text.write(folder)
-
-
-@pytest.mark.parametrize('kind', ['five_bar', 'hexapod'])
-def test_loops_are_read_from_constraints(tmp_path: Path, kind: str) -> None:
-    make = getattr(robots, kind)
-    expected = DriveModel.load(make().write(tmp_path))
-    s = expected.robot.structure
-    home = s.home[s.tables.drives]
-    q, v, a = np.random.default_rng(0).uniform(-0.02, 0.02, size=(3, 5, len(home)))
-    motion = JointMotion(home + q, v, a)
-    forces = expected.drive_forces(motion).total
-    (tmp_path / 'other').mkdir()
-    found = DriveModel.load(as_constraints(make(), tmp_path / 'other'))
-    assert found.drive_forces(motion).total == pytest.approx(forces, abs=1e-9)
-
-
-def test_axes_of_constraints_are_those_of_their_joint(tmp_path: Path) -> None:
-    """A hinge's axis is z of both frames; of a universal joint one axis is x, the other y."""
-    path = tmp_path / 'robot.urdf'
-    path.write_text('''<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed">
-      <parent link="a"/><child link="b"/></joint>
-      <constraint name="hinge" type="continuous"><parent link="a"/>
-        <parent_origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/><parent_axis xyz="2 0 0"/>
-        <child link="b"/><child_axis xyz="0 1 0"/></constraint>
-      <constraint name="cross" type="universal"><parent link="a"/><parent_axis xyz="0 0 1"/>
-        <child link="b"/><child_axis xyz="1 0 0"/></constraint></robot>''')
-    hinge, cross = read_urdf(str(path)).loops
-    assert hinge.kind == 'revolute'
-    assert hinge.frame_a.p == pytest.approx([1, 2, 3])
-    assert hinge.frame_a.R[:, 2] == pytest.approx([0, 1, 0])
-    assert hinge.frame_b.R[:, 2] == pytest.approx([0, 1, 0])
-    assert cross.frame_a.R[:, 0] == pytest.approx([0, 0, 1])
-    assert cross.frame_b.R[:, 1] == pytest.approx([1, 0, 0])
-    for frame in (hinge.frame_a, hinge.frame_b, cross.frame_a, cross.frame_b):
-        assert np.linalg.det(frame.R) == pytest.approx(1)
-        assert pytest.approx(np.eye(3), abs=1e-12) == frame.R.T @ frame.R
-
-
-@pytest.mark.parametrize(('more', 'words'), [
-    ('screw', r'constraint tip: its type is "screw", must be one of fixed, revolute'),
-    ('nowhere', r'constraint tip is on nowhere, which is no link')])
-def test_constraints_that_cannot_be_are_refused_by_name(
-    tmp_path: Path, more: str, words: str,
-) -> None:
-    path = as_constraints(robots.five_bar(), tmp_path)
-    urdf = tmp_path / 'five_bar.urdf'
-    if more == 'screw':
-        urdf.write_text(urdf.read_text().replace('name="tip" type="revolute"',
-                                                 'name="tip" type="screw"'))
-    if more == 'nowhere':
-        head, tail = urdf.read_text().split('<constraint')
-        urdf.write_text(f'{head}<constraint{tail.replace("left_rod", "nowhere")}')
-    with pytest.raises(PprsError, match=words) as error:
-        DriveModel.load(path)
-    assert '\n' not in str(error.value)
+def test_loops_that_only_a_model_file_can_have_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableFileError, match=r'"hinge".* under robot.loops'):
+        one_link(tmp_path, (0.01, 0.08, 0.08), '<constraint name="hinge" type="revolute"/>')
 
 
 XACRO = '''<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">

@@ -97,7 +97,6 @@ def test_efforts_are_the_models_on_every_topic(
     status = node.wait_for_status(code='OK', level='OK')
     assert 0 < status['workspace_margin'] < 1
     assert 'singularity_margin' not in status
-    assert status['taken_from_paper'] == []
 
 
 def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(

@@ -64,7 +64,7 @@ def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: A
         return (np.array([1.0 / v for v in drive.velocity.tolist()]),)
 
     package.WornBrake.columns = classmethod(columns)
-    from pprs_dynamics.physics.effects.foreign_effects import guard
+    from pprs_dynamics.physics.effects.catalogue import guard
 
     guard(package.WornBrake)
     with feedforward_bench(**parameters('worn_brake'), command_timeout=0.15) as node:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
@@ -51,6 +53,29 @@ def test_the_end_of_a_path_does_the_timeouts_action(action: str) -> None:
         # A stream that follows and breaks off is another matter.
         node.answer(message_of(random_motion(np.random.default_rng(1), 1)))
         assert node.wait_for_status(code='STALE')['level'] == 'STALE'
+
+
+def test_a_stop_after_a_slow_answer_holds_the_pose_of_the_present_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As the first answer of a node that still compiles its equations."""
+    times = np.arange(1.0, 4.0, 0.01)
+    motion = HelicalPath().motion(times)
+    path = DriveModel.load().drive_forces(motion).mechanism.position
+
+    def slow(model: DriveModel, *arguments: object) -> object:
+        time.sleep(0.6)
+        return answer(model, *arguments)
+
+    answer = DriveModel.drive_forces
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        monkeypatch.setattr(DriveModel, 'drive_forces', slow)
+        node.answer(message_of(motion))
+        monkeypatch.undo()
+        node.node.trigger_deactivate()
+        assert node.bench.spin_until(lambda: len(node.joint_command) == 2)
+        held = np.array(node.joint_command[-1].position)
+        assert times[np.abs(path - held).max(axis=1).argmin()] > 1.55
 
 
 @pytest.mark.parametrize('stamped', [False, True], ids=['no stamp', 'stamp of this day'])

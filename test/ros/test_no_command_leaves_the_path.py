@@ -122,9 +122,14 @@ def test_a_controller_whose_trajectory_ends_in_motion_is_stopped_along_the_path(
     check_held(cell, 1.0, 3.5)
 
 
-@pytest.mark.parametrize('factor', [0.5, 0.0], ids=['half as fast', 'stands'])
+# [s] between messages of a slow simulator, or of one on a busy machine: more than the timeout.
+SELDOM = 0.3
+
+
+@pytest.mark.parametrize(('factor', 'period'), [(0.5, SELDOM), (0.0, 0.01)],
+                         ids=['half as fast', 'stands'])
 def test_a_simulation_slower_than_real_time_keeps_to_the_path(
-    cell: Cell, ros_domain: int, tmp_path: Path, factor: float,
+    cell: Cell, ros_domain: int, tmp_path: Path, factor: float, period: float,
 ) -> None:
     began = time.monotonic()
     factors = {'now': 1.0}
@@ -138,7 +143,7 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
 
     clock = cell.bench.probe.create_publisher(Clock, '/clock', 10)
     timer = cell.bench.probe.create_timer(
-        0.01, lambda: clock.publish(Clock(clock=conversions.time(round(simulated() * 1e9)))))
+        period, lambda: clock.publish(Clock(clock=conversions.time(round(simulated() * 1e9)))))
     command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true', '-p',
                'use_sim_time:=true']
     with node_process(command, ros_domain, tmp_path / 'log'):
@@ -161,7 +166,7 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
             # Whoever follows single commands is held where the path was when the clock stopped.
             assert cell.bench.spin_until(lambda: len(cell.commands) == 2, 3.0)
             assert cell.bench.spin_until(lambda: cell.bench.status[-1]['code'] == 'STALE')
-            assert 'the clock has stood still' in cell.bench.status[-1]['message']
+            assert 'ROS time does not advance' in cell.bench.status[-1]['message']
             where = 3.0 + simulated() - start
             check_held(cell, where - 0.1, where + 0.25)
             assert len(cell.trajectories) == 1

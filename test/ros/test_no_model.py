@@ -41,9 +41,8 @@ def test_changes_of_the_papers_robot_are_no_model(kind: type, given: dict[str, o
             Parameter(name, value=value) for name, value in given.items()])
 
 
-def test_a_demonstration_says_so_and_stays_one() -> None:
+def test_a_demonstration_stays_one() -> None:
     with bench() as running:
         node = running.add(FeedforwardNode, parameter_overrides=[Parameter('demo', value=True)])
-        assert 'masses.payload' in node._settings.taken_from_paper
         answer, = node.set_parameters([Parameter('demo', value=False)])
         assert not answer.successful

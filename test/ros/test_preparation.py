@@ -26,10 +26,8 @@ MOTION = random_motion(np.random.default_rng(8), 1)
 def test_a_node_without_compiled_kernels_answers_messages_and_services(
     ros_domain: int, tmp_path: Path,
 ) -> None:
-    pytest.importorskip('numba')
     log = tmp_path / 'log'
-    cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'),
-            'PPRS_DYNAMICS_PLAIN': '0'}
+    cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
     command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true', '-p', 'max_age:=0.0',
                '-p', 'command_timeout:=0.0']
     with bench() as running, node_process(command, ros_domain, log, cold) as process:

@@ -33,11 +33,11 @@ NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 
 
 
 def text_of(model: Any, kind: str) -> str:
-    return written(export_robot(express(model, kind), kind), kind)
+    return written(export_robot(express(model, kind)), kind)
 
 
 def replay_error(model: DriveModel, kind: str) -> float:
-    robot = export_robot(express(model, kind), kind)
+    robot = export_robot(express(model, kind))
     return float(replay(model, robot, written(robot, kind), kind).error.max())
 
 

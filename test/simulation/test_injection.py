@@ -20,7 +20,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injected_forms import InjectedEffectError
 from pprs_dynamics.simulation.injection import (

@@ -189,6 +189,3 @@ def test_noise_has_its_size_and_its_correlation() -> None:
     for lag in (1, 5):
         found = np.mean(noise[lag:] * noise[:-lag]) / noise.var()
         assert found == pytest.approx(0.36 * 0.9 ** lag, abs=0.04)
-
-
-# House rules.

@@ -25,7 +25,7 @@ import numpy as np
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import StructureLoad
 
 PLACE, FAULT = os.environ.get('WORN_BRAKE', 'nowhere none').split()
 

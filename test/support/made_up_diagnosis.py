@@ -12,8 +12,11 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RankedEffect, RankedSet
+from pprs_dynamics.inference.diagnosis.diagnosis import (
+    Diagnosis,
+    FoundEffect,
+    RankedSet,
+)
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -65,7 +68,7 @@ def statement(drive: str = 'slide_1', variable: str = 'position', kind: str = 'r
               limits: tuple[float, float] | None = (0.01, 0.02)) -> Statement:
     """Return what remains somewhere."""
     return Statement(drive, variable, limits, 0.41, 0.07, f'{drive}: 41% of its squared error lies '
-                     'somewhere, in 7% of the time; it is shifted there by +0.3 N', 77.0, kind, 0.3,
+                     'somewhere, in 7% of the time; it is shifted there by +0.3 N', 77.0, kind,
                      0.3 ** 2 * 0.07)
 
 
@@ -79,12 +82,12 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
     fields: dict[str, Any] = {
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
-            RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
+            ranked_effect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
         'suspects': (), 'depends_on': (), 'sets': (), 'barred': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),
         'notes': (), 'model': model, 'adopted': model, 'residuals': given,
-        'remaining': residuals.error, 'noise_floor': NOISE}
+        'remaining': residuals.error}
     return Diagnosis(**{**fields, **changes})
 
 
@@ -108,4 +111,10 @@ def calibration(after: float = 1.02) -> Calibration:
     return Calibration('masses.payload', None, 1.0, after, 0.002, 'kg')
 
 
-SUSPECT = RankedEffect('effort_offset', ('slide_3',), -4.2, 0.06)
+def ranked_effect(name: str, drives: tuple[str, ...] | None, evidence: float,
+                  error_after: float) -> RankedSet:
+    """Return an effect alone with its evidence."""
+    return RankedSet(((name, drives),), CostTerms(names=-evidence), error_after=error_after)
+
+
+SUSPECT = ranked_effect('effort_offset', ('slide_3',), -4.2, 0.06)

@@ -70,7 +70,7 @@ def _adoption(before: Residuals) -> Page:
     with_it = replace(after, parts={'coulomb_friction': friction})
     return adoption_page(Adoption(
         EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), model, model, before, with_it,
-        0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE), NOISE,
+        0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE),
         {'lift_2.force': Estimate(0.6, 0.01, 'N')},
         remarks=('the recordings call for time_delay, too',), calibrated=(calibration(),),
         rivals=('load_friction',), reason='the error on held-out data falls'),

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import pytest
 
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.physics.mechanism import evaluation
 
 
 @dataclass(frozen=True)
@@ -63,5 +62,4 @@ def as_a_new_process(columns: int) -> Iterator[None]:
                          ResourceWarning):
             warnings.simplefilter('ignore', category)
         patch.setenv('COLUMNS', str(columns))
-        patch.setattr(evaluation, '_plain_samples', 0)
         yield

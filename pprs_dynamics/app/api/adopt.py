@@ -13,6 +13,11 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.app.api.diagnose import DiagnosisResult
 from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.adoption_report import adoption_page, adoption_view, run_view
+from pprs_dynamics.app.report.history_report import history_page
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_errors
+from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
 from pprs_dynamics.inference.adoption.adopt import original
@@ -20,14 +25,15 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
-from pprs_dynamics.inference.fit.base_fit import Refit, refit_base, require_open_numbers
+from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base, require_open_numbers
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 
 class RefusedError(PprsError, ValueError):
@@ -84,14 +90,10 @@ class AdoptionResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.adoption_report import adoption_view
-
         return adoption_view(self.adoption)
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
-        from pprs_dynamics.app.report.adoption_report import adoption_page
-
         return adoption_page(self.adoption, self.inputs.fitted, self.inputs.held_out,
                              replace(self.inputs.files, model=saved_as).command(
                                  'diagnose', held_out=True))
@@ -117,19 +119,19 @@ class AdoptionRunResult(Result):
         Model and recordings.
     run : AdoptionRun
         What was adopted and refused, one after the other.
-    refit : Refit, optional
+    refit : BaseFit, optional
         Of the base model with the adopted effects.
     """
 
     inputs: Inputs
     run: AdoptionRun
-    refit: Refit | None = None
+    refit: BaseFit | None = None
 
     @property
     def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
-        if self.refit is not None and self.refit.taken:
-            return self.refit.fit.model
+        if self.refit is not None and self.refit.ratio < 1:
+            return self.refit.model
         return self.run.model
 
     @property
@@ -153,21 +155,17 @@ class AdoptionRunResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        refit = {} if self.refit is None else {'refit': self.refit.to_dict()}
+        refit = {} if self.refit is None else {'refit': {
+            **self.refit.to_dict(), 'taken': self.refit.ratio < 1, 'reason': self.refit.change}}
         return {**self.run.to_dict(), **refit}
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.adoption_report import run_view
-
-        return run_view(self.run, details)
+        return run_view(self.run, self.inputs.files.command(
+            'next-experiment', '--output', 'next.csv'), details)
 
     def page(self) -> Page:
         """Return the page of `pprs history --report` of the model."""
-        from pprs_dynamics.app.report.history_report import history_page
-        from pprs_dynamics.drives import common_effort
-        from pprs_dynamics.physics.model.ledger import read_steps
-
         return history_page('the adopted model', read_steps(self.model.values),
                             common_effort(self.model.units))
 
@@ -273,13 +271,11 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
         None if diagnosis is None else diagnosis.diagnosis, inputs.reference)
     if not again or not run.adopted:
         return AdoptionRunResult(inputs, run)
-    return AdoptionRunResult(inputs, run, refit_base(
+    return AdoptionRunResult(inputs, run, fit_base(
         run.model, again, inputs.held_out, stage(progress, 'fitting the base')))
 
 
 def _plot(first: Adoption, last: Adoption) -> Figure:
-    from pprs_dynamics.app.report.pictures import plot_errors
-
     return plot_errors({'before': rms_by_drive(first.residuals_before),
                         'after': rms_by_drive(last.residuals_after),
                         'noise': last.noise_floors}, last.unit)

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.comparison_report import comparison_page, comparison_view
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
-from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
@@ -28,7 +30,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -79,14 +81,10 @@ class ComparisonResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.comparison_report import comparison_view
-
         return comparison_view(self.comparison, self._next, details, self.beside)
 
     def page(self) -> Page:
         """Return the page of `pprs compare --report`."""
-        from pprs_dynamics.app.report.comparison_report import comparison_page
-
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
                                self.comparison, self.notes, self._next, self.beside)
 
@@ -112,8 +110,6 @@ class ComparisonResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: error and noise of every drive, and the worst drive over time."""
-        from pprs_dynamics.app.report.pictures import plot_errors, plot_series
-
         drives = self.comparison.drives
         figure = plot_errors(
             {'error': {name: drive.rms for name, drive in drives.items()},

@@ -18,10 +18,12 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -29,7 +31,7 @@ from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -68,14 +70,10 @@ class DiagnosisResult(Result):
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:
         """Return what the terminal shows, with the command to go on with, or without."""
-        from pprs_dynamics.app.report.diagnosis_report import diagnosis_view
-
         return diagnosis_view(self.diagnosis, self._words, details, next_step)
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""
-        from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
-
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
             self.diagnosis, self._words, after,
@@ -91,8 +89,6 @@ class DiagnosisResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""
-        from pprs_dynamics.app.report.pictures import plot_errors
-
         residuals = self.diagnosis.residuals
         after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
         return plot_errors(

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.fit_report import fit_page, fit_view
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
@@ -19,7 +22,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -58,26 +61,20 @@ class FitResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.fit_report import fit_view
-
         return fit_view(self.inputs.model, self.fit, details)
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""
-        from pprs_dynamics.app.report.fit_report import fit_page
-
         return fit_page(self.inputs.model, self.fit,
                         [recording.name for recording in self.inputs.fitted],
                         [recording.name for recording in self.inputs.held_out])
 
     def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([number.to_dict() for number in self.fit.numbers])
+        return data_frame([vars(number) for number in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""
-        from pprs_dynamics.app.report.pictures import plot_errors
-
         return plot_errors({'before': self.fit.before, 'after': self.fit.after,
                             'held out': self.fit.held_out},
                            common_effort(self.inputs.model.units))

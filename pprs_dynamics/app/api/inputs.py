@@ -11,6 +11,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.readings.check import with_mistakes
 from pprs_dynamics.inference.readings.findings import no_measurements
@@ -24,7 +26,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
+    from pprs_dynamics.inference.adoption.adoption import LedgerBook
     from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
     from pprs_dynamics.inference.fit.reference import Reference
 
@@ -122,6 +124,7 @@ class Inputs:
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
         _refuse_repeats(held_out, fitted.values(), OTHER)
+        _require_efforts({**fitted, **held_out})
         entries = [*listed_recordings(recordings), *listed_recordings(validate)]
         paths = frozenset(str(entry) for entry in entries if not isinstance(entry, Recording))
         return cls(found, fitted, held_out, paths, base, path, topic or '')
@@ -251,7 +254,7 @@ class Inputs:
     @property
     def ledger(self) -> LedgerBook:
         """What enters adoptions on these recordings into a model's ledger."""
-        from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+        from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
             return tuple(RecordingEntry.of(recording, name if name in self.paths else None)
@@ -301,6 +304,18 @@ def _require_kinds(recordings: Given, validate: Given) -> None:
             if not isinstance(entry, (Recording, str, PathLike)):
                 raise InputError(f'{name}: one is of type {type(entry).__name__}, must be a path '
                                  'or a Recording (Recording.from_arrays makes one of arrays)')
+
+
+def _require_efforts(recordings: Mapping[str, Recording]) -> None:
+    """Raise UnreadableFileError for a recording without usable samples or without efforts."""
+    for name, recording in recordings.items():
+        if not recording.segments:
+            raise UnreadableFileError(name, f'none of its {len(recording.time)} samples can be '
+                                      'used, must have a longer part without a gap')
+        if not np.isfinite(recording.effort).any():
+            raise UnreadableFileError(name, 'no effort of any drive is recorded, must be recorded '
+                                      'beside the positions (<drive>/effort in a CSV, effort in '
+                                      'JointState)')
 
 
 def _refuse_repeats(found: Mapping[str, Recording], earlier: Iterable[Recording], rule: str,

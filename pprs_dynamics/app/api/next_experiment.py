@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.app.api.inputs import (
-    InputError,
     Inputs,
     Model,
     Progress,
@@ -20,7 +19,15 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
+from pprs_dynamics.app.report.experiment_report import (
+    drive_rows,
+    experiment_page,
+    experiment_view,
+    platform_rows,
+)
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_over_time
+from pprs_dynamics.inference.experiments.motion_design import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -28,7 +35,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 
@@ -76,14 +83,10 @@ class ExperimentResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.experiment_report import experiment_view
-
         return experiment_view(self.design)
 
     def page(self) -> Page:
         """Return a page: expected evidence, curves, and use of the limits."""
-        from pprs_dynamics.app.report.experiment_report import experiment_page
-
         return experiment_page(self.design, self.motion)
 
     def table(self) -> DataFrame:
@@ -92,22 +95,16 @@ class ExperimentResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
-        from pprs_dynamics.app.report.pictures import plot_over_time
-
         motion = self.motion
         assert motion.time is not None
-        if isinstance(motion, JointMotion):
-            return plot_over_time(motion.time, {
-                'position': dict(zip(self.inputs.model.drives, motion.position.T, strict=True))})
-        return plot_over_time(motion.time, {
-            'position [m]': dict(zip('xyz', motion.position.T, strict=True)),
-            'velocity [m/s]': dict(zip('xyz', motion.linear_velocity.T, strict=True))})
+        return plot_over_time(motion.time, drive_rows(self.design, motion) if isinstance(
+            motion, JointMotion) else platform_rows(motion))
 
 
 def next_experiment(
     model: Model, recordings: Recordings = (), *, purpose: str = 'separate',
-    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
-    noise: float = 0.05, rate: float = RATE, topic: str | None = None,
+    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float | None = None, rate: float = RATE, topic: str | None = None,
     progress: Progress | None = None,
 ) -> ExperimentResult:
     """Design the motion that best separates the remaining candidates.
@@ -118,15 +115,15 @@ def next_experiment(
     recordings : path, Recording, or a sequence of them
     purpose : {'separate', 'commission'}
         What the recordings leave open; or a first motion of a new robot, without recordings.
-    limits : MotionLimits or ArmLimits, optional
+    limits : MotionLimits, optional
         In addition to those of the model file or the URDF.
     duration : float
         [s]
     seed : int
         Of the search.
-    noise : float
-        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
-        recordings.
+    noise : float, optional
+        Standard deviation of means of the effort over 0.01 s [N, N m], for 'commission' without
+        recordings; by default 1 % of each drive's largest effort.
     rate : float
         Of the samples [Hz].
     topic, progress : optional
@@ -147,13 +144,8 @@ def next_experiment(
     """
     inputs = Inputs.of(model, recordings, (), topic, progress)
     check_purpose(purpose, inputs.fitted)
-    found = inputs.model
-    share_done = stage(progress, 'designing')
-    kind = ArmLimits if found.moves_joints else MotionLimits
-    if limits is not None and not isinstance(limits, kind):
-        raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
-                         f'{found.title}')
-    designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise, share_done)
+    designed = design(inputs.model, inputs.fitted, purpose, limits, duration, seed, noise,
+                      stage(progress, 'designing'))
     count = int(duration * rate + 1e-9) + 1
     return ExperimentResult(inputs, designed, designed.motion(np.arange(count) / rate), purpose,
                             seed, rate)

@@ -11,14 +11,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.record import record_of
+from pprs_dynamics.app.report.terminal import as_html, as_text
 from pprs_dynamics.errors import MissingLibraryError
 
 if TYPE_CHECKING:
     # What results return, named for all of them.
     from matplotlib.figure import Figure as Figure
     from pandas import DataFrame as DataFrame
-
-    from pprs_dynamics.app.report.page import Page as Page
 
 WIDTH = 100  # characters of a line of text
 
@@ -75,15 +76,11 @@ class Result(ABC):
 
     def record(self, command: str = '') -> list[tuple[str, str]]:
         """Return what a result is of: date, version, command, model and recordings with hashes."""
-        from pprs_dynamics.app.report.record import record_of
-
         inputs = getattr(self, 'inputs', None)
         return (record_of(None, {}, {}, command) if inputs is None else
                 record_of(inputs.model, inputs.recordings, inputs.validation, command))
 
     def __str__(self) -> str:
-        from pprs_dynamics.app.report.terminal import as_text
-
         return as_text(self.view(), WIDTH)
 
     def __repr__(self) -> str:
@@ -93,8 +90,6 @@ class Result(ABC):
             return object.__repr__(self)
 
     def _repr_html_(self) -> str:
-        from pprs_dynamics.app.report.terminal import as_html
-
         return as_html(self.view(), WIDTH)
 
 

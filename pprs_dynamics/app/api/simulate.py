@@ -14,6 +14,9 @@ import numpy as np
 
 from pprs_dynamics.app.api.inputs import Model, Progress, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.pictures import plot_over_time
+from pprs_dynamics.app.report.tables import recording_page, recording_rows, simulation_view
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -22,7 +25,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 500.0  # [Hz], of the 3-PPRS
 
@@ -69,14 +72,10 @@ class SimulationResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""
-        from pprs_dynamics.app.report.tables import simulation_view
-
         return simulation_view(len(self.recording.time), self.rate, len(self.effects))
 
     def page(self) -> Page:
         """Return a page: positions and efforts of every drive over time."""
-        from pprs_dynamics.app.report.tables import recording_page
-
         return recording_page(self.recording, self.model.units)
 
     def table(self) -> DataFrame:
@@ -90,12 +89,8 @@ class SimulationResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
-        from pprs_dynamics.app.report.pictures import plot_over_time
-
-        names = self.recording.drives
-        return plot_over_time(self.recording.time, {
-            'position': dict(zip(names, self.recording.position.T, strict=True)),
-            'effort': dict(zip(names, self.recording.effort.T, strict=True))})
+        return plot_over_time(self.recording.time,
+                              recording_rows(self.recording, self.model.units))
 
 
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,

@@ -137,10 +137,10 @@ export class Robot {
       context.stroke();
     };
     context.font = '12px system-ui';
-    for (const {start, end, kind, drive} of this.lines) {
+    for (const {start, end, drive} of this.lines) {
       line(this.point(start), this.point(end),
-           drive < 0 ? css(kind === 'guide' ? '--line' : '--quiet') : colour(drive),
-           drive < 0 ? (kind === 'guide' ? 2 : 4) : 8);
+           drive < 0 ? css('--quiet') : colour(drive),
+           drive < 0 ? 4 : 8);
     }
     for (const joint of this.joints) {
       const [x, y] = seen(this.point(joint));

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.adopt import adopt
-from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.arguments import add_shared
 from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.adoption.request import requested
@@ -25,18 +25,14 @@ EXAMPLE = 'pprs adopt stribeck_friction run.mcap --validate other.mcap --output 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     effect = parser.add_argument(
-        'effect', metavar='EFFECT', help='name of an effect, on the drives that the recordings '
-        'call for; or EFFECT:drive,drive; or measured_curve:DRIVE@VARIABLE for what no effect '
-        'explains')
+        'effect', metavar='EFFECT', help='name of an effect, placed on the drives where it '
+        'reduces the error most; EFFECT:drive,drive names the drives; '
+        'measured_curve:DRIVE@VARIABLE is a correction table for what no effect explains')
     effect.completer = lambda **_: catalogue()  # type: ignore[attr-defined]  # of argcomplete
-    arguments.add_recordings(parser)
-    arguments.add_as_it_is(parser)
-    arguments.add_validation(parser)
-    arguments.add_reference(parser)
-    arguments.add_model_output(parser, 'model file to write')
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference', 'output',
+               'report')
     parser.add_argument('--force', action='store_true',
-                        help='adopt it in spite of objections; the history records them')
-    arguments.add_report(parser)
+                        help='adopt it although the check objects; the history records why')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.numbers import parse_number, parse_whole
@@ -33,57 +34,6 @@ DEFAULT_MODEL = 'config/paper.yaml'
 
 class UsageError(PprsError, ValueError):
     """Arguments that do not go together, or that what was read does not have."""
-
-
-def add_details(parser: argparse.ArgumentParser) -> None:
-    """Declare --details."""
-    parser.add_argument('--details', action='store_true', help='print everything')
-
-
-def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with all figures',
-               ) -> None:
-    """Declare --report."""
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE), help=what)
-
-
-def add_topic(parser: argparse.ArgumentParser) -> None:
-    """Declare --topic."""
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, if a file '
-                        'has several')
-
-
-def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """Declare RECORDING… and --topic."""
-    parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
-                        help='bag (rosbag2 folder, .mcap, .db3, ROS 1) or table (.csv, .csv.gz, '
-                        '.parquet, .mat, .npz, .json)')
-    add_topic(parser)
-
-
-def add_as_it_is(parser: argparse.ArgumentParser) -> None:
-    """Declare --as-it-is."""
-    parser.add_argument('--as-it-is', action='store_true', help='take recordings as they are, '
-                        'whatever their units, signs and efforts look like')
-
-
-def add_validation(parser: argparse.ArgumentParser,
-                   what: str = 'held-out errors are taken on it') -> None:
-    """Declare --validate."""
-    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
-                        help=f'a recording that is never fitted: {what}; may be repeated')
-
-
-def add_reference(parser: argparse.ArgumentParser) -> None:
-    """Declare --reference."""
-    parser.add_argument('--reference', metavar='RECORDING', nargs='*',
-                        help='runs of a day on which the machine was correct (default: those in '
-                        'the model file); report what has changed since then')
-
-
-def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:
-    """Declare --output of a model file."""
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
-                        required=required, help=what)
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
@@ -146,6 +96,42 @@ def output_file(*endings: str) -> Callable[[str], str]:
             raise argparse.ArgumentTypeError(f'{displayed(text)}: {error.strerror}') from None
         return text
     return read
+
+
+# Arguments of several commands.
+SHARED: dict[str, dict[str, Any]] = {
+    'recordings': {'metavar': 'RECORDING', 'help': 'bag (rosbag2 folder, .mcap, .db3, ROS 1) or '
+                   'table (.csv, .csv.gz, .parquet, .mat, .npz, .json)'},
+    'topic': {'metavar': 'NAME', 'help': 'topic of type sensor_msgs/JointState, if a bag has '
+              'several'},
+    'as-it-is': {'action': 'store_true', 'help': 'accept a recording whose units, signs or '
+                 'efforts look wrong'},
+    'validate': {'metavar': 'RECORDING', 'action': 'append', 'default': [],
+                 'help': 'a recording that is not fitted: held-out errors are measured on it; may '
+                 'be repeated'},
+    'reference': {'metavar': 'RECORDING', 'nargs': '*', 'help': 'report what has changed since '
+                  'these recordings of the healthy machine (none named: those that the model file '
+                  'names)'},
+    'details': {'action': 'store_true', 'help': 'print all findings, tables and values'},
+    'report': {'metavar': 'FILE.html', 'type': output_file(*PAGE),
+               'help': 'write a page with all figures'},
+    'output': {'metavar': 'FILE.yaml', 'type': output_file(*MODEL), 'help': 'model file to write'},
+}
+
+
+def add_shared(parser: argparse.ArgumentParser, *names: str, required: bool = True, **texts: str,
+               ) -> None:
+    """Declare some of the shared arguments; `texts` replaces the help of an argument.
+
+    `required` is about recordings and --output.
+    """
+    for name in names:
+        settings = SHARED[name] | ({'help': texts[name]} if name in texts else {})
+        if name == 'recordings':
+            parser.add_argument(name, nargs='+' if required else '*', **settings)
+        else:
+            option = parser.add_argument(f'--{name}', **settings)
+            option.required = required and name == 'output'
 
 
 def output_folder(text: str) -> str:

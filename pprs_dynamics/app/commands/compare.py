@@ -17,14 +17,12 @@ EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    arguments.add_recordings(parser)
-    arguments.add_as_it_is(parser)
-    arguments.add_details(parser)
+    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'details', 'report')
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
-                        help='write measured effort, model, parts and residual as joint states')
-    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
-                        'errors on the same recordings')
-    arguments.add_report(parser)
+                        help='bag to write: measured effort, effort of the model, its parts and '
+                        'the residual, as sensor_msgs/JointState')
+    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file; its '
+                        'errors on the same recordings are printed too')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -21,18 +21,15 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    arguments.add_recordings(parser)
-    arguments.add_as_it_is(parser)
-    arguments.add_validation(parser)
-    arguments.add_reference(parser)
-    arguments.add_details(parser)
-    arguments.add_report(parser)
+    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference',
+                         'details', 'report')
     parser.add_argument('--adopt-all', action='store_true',
                         help='adopt the reported effects until nothing is missing')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
                         help='then fit the base model again with the added effects, as pprs fit '
                         'does: to these recordings, or to the diagnosed ones')
-    arguments.add_model_output(parser, 'model file that --adopt-all writes', required=False)
+    arguments.add_shared(parser, 'output', required=False,
+                         output='model file that --adopt-all writes')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -67,7 +64,7 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
     if count or not result.refused:
         result.save(options.output)
         if result.refit is not None:
-            screen.print(result.refit.reason)
+            screen.print(result.refit.change)
         screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
 

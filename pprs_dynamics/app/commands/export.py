@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', metavar='MODEL', help='model file')
     parser.add_argument('--to', choices=FORMATS, required=True, help='format of the file')
     parser.add_argument('--output', metavar='FILE', type=output_file(*ENDINGS), required=True,
-                        help='.urdf, or .xml and .mjcf')
+                        help='robot file to write: .urdf for urdf, .xml or .mjcf for mjcf')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     model = DriveModel.load(options.file)
     expressed = express(model, options.to)
-    robot = export_robot(expressed, options.to)
+    robot = export_robot(expressed)
     text = written(robot, options.to)
     found = replay(model, robot, text, options.to)
     write_text(options.output, text)

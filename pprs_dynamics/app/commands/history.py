@@ -9,11 +9,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import add_model_output, add_report
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -26,14 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='undo the last step')
-    add_model_output(parser, 'model file that --undo writes', required=False)
-    add_report(parser, 'draw the falling error as a page')
+    add_shared(parser, 'output', 'report', required=False, output='model file that --undo writes',
+               report='write a page that shows how the error fell')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    if options.undo != bool(options.output):
-        raise ModelError('--output', options.output, 'be given with --undo, and only then')
+    if options.undo and not options.output:
+        raise UsageError('--undo: no --output FILE is given, must say where the new model file '
+                         'goes')
+    if options.output and not options.undo:
+        raise UsageError('--output: it is given without --undo, which alone writes a model file')
     screen = console()
     # Here, as --help draws nothing.
     from pprs_dynamics.app.report.history_report import history_page, history_view

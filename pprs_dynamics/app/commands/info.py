@@ -11,13 +11,13 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
-from pprs_dynamics.app.commands.arguments import UsageError, add_recordings, add_report
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import (
     describe_mechanism,
     mechanism_lines,
 )
-from pprs_dynamics.app.report.tables import reading_table, recording_page, recording_table
+from pprs_dynamics.app.report.tables import reading_table, recording_page
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
@@ -34,8 +34,8 @@ EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser, required=False)
-    add_report(parser, 'draw positions and efforts over time')
+    add_shared(parser, 'recordings', 'topic', 'report', required=False,
+               report='write a page with positions and efforts over time')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,15 +68,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, screen: Any,
-                    by_column: bool = False) -> tuple[list[Recording], list[Summary]]:
-    """Print recordings by drive or by column, and their faults, and return both."""
+                    ) -> tuple[list[Recording], list[Summary]]:
+    """Print how the columns of recordings are read, and their faults, and return both."""
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, topic, progress) for path in paths]
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
-        for table in ([reading_table(summary, model.recorded)] if by_column
-                      else recording_table(summary, model.units)):
-            screen.print(table)
+        screen.print(reading_table(summary, model.recorded))
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
         others = [finding for finding in summary.findings if isinstance(finding, OtherReading)]

@@ -16,8 +16,8 @@ from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.pictures import plot_over_time, save
+from pprs_dynamics.app.report.tables import recording_rows
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
-from pprs_dynamics.drives import common_unit
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -29,18 +29,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('robot', metavar='ROBOT', help='URDF or MJCF')
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='what the robot did: joints and columns are called as in the first; '
-                        'files of one quantity each (q.csv tau.csv), or their folder, are one')
+                        help='recordings of this robot; the first gives the names of joints and '
+                        'columns; files of one quantity each (q.csv tau.csv), or their folder, '
+                        'count as one recording')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
     parser.add_argument('--base', metavar='LINK', default='', help='the link that does not move')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
-    parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
+    parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
     parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
-                        help='positions and efforts as they are read')
-    parser.add_argument('--overwrite', action='store_true', help='replace --output where it is')
+                        help='picture of positions and efforts as they are read')
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing model file')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -63,13 +64,10 @@ def run(options: argparse.Namespace) -> int:
             screen.print(f'  {shown(line)}')
         return 1
     recordings, summaries = show_recordings(first.model, list(map(str, first.recordings)), None,
-                                            screen, by_column=True)
+                                            screen)
     if options.picture and recordings:
-        save(plot_over_time(recordings[0].time, {
-            f'{what} [{common_unit(first.model.units, unit)}]': dict(
-                zip(first.model.drives, values.T, strict=True))
-            for what, unit, values in (('position', 'm', recordings[0].position),
-                                       ('effort', 'N', recordings[0].effort))}), options.picture)
+        save(plot_over_time(recordings[0].time, recording_rows(
+            recordings[0], first.model.units)), options.picture)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)

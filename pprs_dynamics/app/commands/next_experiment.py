@@ -11,9 +11,7 @@ import shlex
 from pprs_dynamics.app.api.next_experiment import RATE, next_experiment
 from pprs_dynamics.app.commands.arguments import (
     POSES,
-    add_as_it_is,
-    add_recordings,
-    add_report,
+    add_shared,
     output_file,
     seed,
 )
@@ -27,16 +25,16 @@ EXAMPLE = 'pprs next-experiment run.mcap --model robot.yaml --output next.csv'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser, required=False)
-    add_as_it_is(parser)
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'report', required=False)
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
-                        required=True, help='poses for play_trajectory; of an arm, positions, '
-                        'velocities and accelerations of its joints')
+                        required=True, help='file of the motion: poses for play_trajectory; for '
+                        'an arm, positions, velocities and accelerations of its joints')
     parser.add_argument('--purpose', choices=PURPOSES, default='separate',
-                        help='separate: the effects that the recordings leave open (default); '
-                        'commission: the first motion of a new robot')
-    parser.add_argument('--seed', type=seed, default=0, help='of the search (default 0)')
-    add_report(parser)
+                        help='separate: a motion that separates the effects which the '
+                        'recordings leave open (default); commission: the first motion of a new '
+                        'robot')
+    parser.add_argument('--seed', metavar='N', type=seed, default=0,
+                        help='seed of the search (default 0)')
 
 
 def run(options: argparse.Namespace) -> int:

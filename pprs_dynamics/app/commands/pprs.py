@@ -28,7 +28,6 @@ from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
     JSON,
-    UsageError,
     check_files,
     output_file,
 )
@@ -48,7 +47,7 @@ examples:
   pprs init ur10e.urdf run.csv --output robot.yaml
   pprs fit free.csv --model robot.yaml --output base.yaml
   pprs diagnose run.csv --model base.yaml --report why.html
-  pprs simulate --output run.mcap --effect stribeck_friction
+  pprs simulate --demo --output run.mcap --effect stribeck_friction
   pprs COMMAND --help
 """
 
@@ -97,13 +96,10 @@ def _ended(given: Sequence[str]) -> int:
         if not given:
             parser.print_help()
             return 0
-        options = parser.parse_args(_with_demo_first(given))
+        options = parser.parse_args(given)
         options.words = given  # for the record of a page
         is_assumed = _choose_model(options)
         check_files(options)
-        from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
-
-        postpone_compiling()
         status: int = _module(options.command).run(options)
         if is_assumed:
             print(NO_MODEL)
@@ -128,24 +124,9 @@ def _ended(given: Sequence[str]) -> int:
     return status
 
 
-def _with_demo_first(given: Sequence[str]) -> list[str]:
-    """Return arguments with --demo, which may be anywhere, before the command."""
-    rest = [word for word in given if word != '--demo']
-    return [*['--demo'][:len(given) - len(rest)], *rest]
-
-
 def _choose_model(options: argparse.Namespace) -> bool:
-    """Take the paper's robot if no --model is given; return whether it is only assumed.
-
-    Raises
-    ------
-    UsageError
-        For --demo with --model.
-    """
+    """Take the paper's robot if no --model is given; return whether it is only assumed."""
     if options.command in WITHOUT_MODEL or options.model is not None:
-        if options.demo:
-            raise UsageError('--demo is given with --model or to a command without a model, must '
-                             'be left out')
         return False
     options.model = DEFAULT_MODEL
     return not options.demo and bool(getattr(options, 'recordings', False))
@@ -207,19 +188,21 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         prog='pprs', description='Compare the dynamics of a robot with measurements, find the '
         'physical effect\nthat the model lacks, add it, and see the error fall.', epilog=EXAMPLES,
         formatter_class=_formatter)
-    parser.add_argument('--demo', action='store_true', help='the model is that of the paper\'s '
-                        f'robot, {DEFAULT_MODEL}')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:
         summary = _summary(name)
-        command = commands.add_parser(name, help=summary.rstrip('.'), description=summary)
+        command = commands.add_parser(name, help=summary.rstrip('.'),
+                                      description=summary[:1].upper() + summary[1:])
         if name not in WITHOUT_MODEL:
-            command.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
-                                 'init writes one')
+            model = command.add_mutually_exclusive_group()
+            model.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
+                               'init writes one')
+            model.add_argument('--demo', action='store_true', help='use the model of the '
+                               f'paper\'s robot, {DEFAULT_MODEL}')
         if name not in WITHOUT_JSON:
             command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
-                                 help='write the result as JSON too')
+                                 help='also write the result as JSON')
         if name in given:
             # Only this one: importing all would take longer than most of them run.
             module = _module(name)

@@ -30,7 +30,7 @@ EXAMPLE = 'pprs reproduce --output output'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('--output', metavar='DIR', required=True, type=output_folder,
-                        help='folder for figures, curves and claims')
+                        help='folder for pictures, curves and claims')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`pprs simulate`: record the simulated robot with hidden effects.
+"""`pprs simulate`: simulate a robot with hidden effects, and write its recording.
 
 Runs the physics-engine robot without ROS, faster than real time, and writes what its sensors say.
 """
@@ -25,7 +25,7 @@ from pprs_dynamics.simulation.injection import NAMES, RANDOM
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
-EXAMPLE = 'pprs simulate --output run.mcap --effect stribeck_friction --seed 2'
+EXAMPLE = 'pprs simulate --demo --output run.mcap --effect stribeck_friction --seed 2'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,19 +33,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
-    parser.add_argument('--effect', metavar='NAME', action='append', default=[],
+    parser.add_argument('--effect', metavar='EFFECT', action='append', default=[],
                         choices=(*NAMES, RANDOM),
-                        help='an effect that the model does not know, drawn from the seed; may be '
-                        'repeated; random, or a name of docs/effects.md')
-    parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
+                        help='an effect of the simulated robot that the model lacks: a name of '
+                        'docs/effects.md, or random; its size depends on --seed; may be repeated')
+    parser.add_argument('--seed', type=seed, metavar='N', default=0,
+                        help='seed of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
-                        help='helix, excitation, or a CSV of poses (default excitation)')
-    parser.add_argument('--duration', type=number(1.0, LONGEST, 's'), default=40.0,
-                        help='of an excitation [s] (default 40)')
-    parser.add_argument('--path-seed', type=seed, default=0, help='of an excitation (default 0)')
-    parser.add_argument('--noise', type=number(0.0, 1e3, 'N'),
-                        help='of the efforts, standard deviation [N m, N] (default half a percent '
-                        'of the largest)')
+                        metavar='PATH',
+                        help='motion: excitation (random, default), helix, or a CSV file of poses')
+    parser.add_argument('--duration', metavar='S', type=number(1.0, LONGEST, 's'), default=40.0,
+                        help='length of an excitation [s] (default 40)')
+    parser.add_argument('--path-seed', metavar='N', type=seed, default=0,
+                        help='seed of an excitation (default 0)')
+    parser.add_argument('--noise', metavar='STD', type=number(0.0, 1e3, 'N'),
+                        help='standard deviation of the efforts [N or N m] (default: 0.5 %% of the '
+                        'largest)')
 
 
 def run(options: argparse.Namespace) -> int:

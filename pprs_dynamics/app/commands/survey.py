@@ -26,14 +26,14 @@ EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='recordings, folders of them, or globs')
-    parser.add_argument('--manifest', metavar='FILE.csv', help='columns path, robot and '
-                        'optionally time, model')
+                        help='recordings, folders of recordings, or patterns such as "run_*.mcap"')
+    parser.add_argument('--manifest', metavar='FILE.csv', help='list of recordings with the '
+                        'columns path and robot, and optionally time and model')
     parser.add_argument('--output', metavar='STORE', required=True, type=output_folder,
                         help='folder of Parquet files; finished recordings in it are skipped')
     parser.add_argument('--effects', metavar='auto|NAME,…', default=AUTO,
-                        help='auto: diagnose each recording; else fit these effects, many times '
-                        'faster; EFFECT or EFFECT:drive+drive')
+                        help='auto (default): diagnose each recording; NAME: fit these effects '
+                        'only, which is many times faster; EFFECT or EFFECT:drive+drive')
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', metavar='N', type=whole(1, MOST_WORKERS),
                        help='processes on this machine (default: one for every core)')
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     screen, store = console(), Path(options.output)
     pandas()
     if bool(options.recordings) == bool(options.manifest):
-        raise UsageError('recordings and --manifest: must be given one of them')
+        raise UsageError('recordings and --manifest: one of the two must be given')
     base = model_of(options.model)
     if options.effects != AUTO and not requests_of(options.effects, base):
         raise UsageError(f'--effects {options.effects!r}: must be auto or names of effects')

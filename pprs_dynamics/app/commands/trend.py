@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import add_report
+from pprs_dynamics.app.commands.arguments import add_shared
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.report.terminal import console, shown
@@ -18,7 +18,7 @@ EXAMPLE = 'pprs trend store --report trend.html'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('store', metavar='STORE', help='folder that pprs survey wrote')
-    add_report(parser, 'write a page with every quantity that changed')
+    add_shared(parser, 'report', report='write a page with every quantity that changed')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -15,9 +15,7 @@ from typing import Any
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
-    add_reference,
-    add_topic,
-    add_validation,
+    add_shared,
     whole,
 )
 from pprs_dynamics.app.workbench.errors import SessionError
@@ -39,25 +37,24 @@ EXAMPLE = 'pprs workbench run.mcap --validate other.mcap'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them to '
-                        'choose from in the browser; or a saved session.json, alone')
-    add_validation(parser, 'adoptions are judged on it')
-    add_reference(parser)
-    add_topic(parser)
+                        help='bag or table, as for all commands; or a folder of them, to choose '
+                        'from in the browser; or one saved session.json')
+    add_shared(parser, 'validate', 'reference', 'topic', validate='a recording that is not fitted: '
+               'adoptions are judged on it; may be repeated')
     parser.add_argument('--live', action='store_true',
-                        help='listen to joint_states, and set effects on running nodes')
+                        help='subscribe to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
-                        help='that --live listens to (default: that of --topic, else joint_states)')
+                        help='topic of --live (default: that of --topic, else joint_states)')
     parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
-                        help='in which --live looks for topic and nodes')
+                        help='namespace of the topic and nodes of --live')
     parser.add_argument('--port', type=whole(0, 65535), default=0,
-                        help='to listen on (default: any that is free)')
+                        help='port of the server (default: any free one)')
     parser.add_argument('--host', type=_one_address, default=HOST,
-                        help=f'to listen on (default {HOST}: nobody else on the network sees it)')
+                        help=f'address of the server (default {HOST}: this machine only)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
     parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='ARGUMENT',
-                        help='of --live, last: remappings, joint_prefix, use_sim_time and QoS, as '
-                        'of a node')
+                        help='arguments of the node of --live, as of any ROS 2 node: remappings, '
+                        'joint_prefix, use_sim_time, QoS; must come last')
 
 
 def run(options: argparse.Namespace) -> int:

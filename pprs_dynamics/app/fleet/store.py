@@ -92,5 +92,6 @@ def read_rows(store: str) -> Any:
             raise UnreadableFileError(file, 'is damaged, delete it and run pprs survey again: '
                                       f'{str(error).splitlines()[0]}') from None
     if not tables or {name for name, *_ in COLUMNS} - {*tables[0].columns}:
-        raise UnreadableFileError(store, 'there is no store of pprs survey')
+        raise UnreadableFileError(store, 'not a store, must be a folder that `pprs survey '
+                                  '--output` wrote')
     return pd.concat(tables, ignore_index=True)

@@ -18,9 +18,9 @@ from pprs_dynamics.app.report.diagnosis_figures import (
     curve_with_band,
 )
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import escape, stacked, verdict_panel
+from pprs_dynamics.app.report.terminal import escape, shell_command, stacked, verdict_panel
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
-from pprs_dynamics.inference.adoption.loop import AdoptionRun
+from pprs_dynamics.inference.adoption.loop import AMBIGUOUS, AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import (
     as_fitted,
     in_unit,
@@ -37,10 +37,15 @@ MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
 
 
-def run_view(run: AdoptionRun, details: bool = False) -> Any:
-    """Return adopted and refused effects, a line or all values of each, and the reason to end."""
+def run_view(run: AdoptionRun, command: str, details: bool = False) -> Any:
+    """Return adopted and refused effects, a line or all values of each, and the reason to end.
+
+    `command` designs the motion that separates an ambiguous effect from its rivals.
+    """
     steps = [adoption_view(step) if details else escape(headline(step)) for step in run.steps]
-    return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
+    following = [shell_command(command)] if run.ended == AMBIGUOUS else []
+    return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}{":" * len(following)}',
+                   *following)
 
 
 def adoption_view(answer: Adoption) -> Any:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -51,6 +51,22 @@ def rows_over_time(count: int, height: int, heights: Sequence[float] | None = No
     figure.update_xaxes(**SECONDS)
     figure.update_xaxes(title_text='time [s]', row=count, col=1)
     figure.update_layout(height=height, **{'margin': MARGIN, 'legend': LEGEND, **layout})
+    return figure
+
+
+def stacked(time: Array, rows: Mapping[str, Mapping[str, Array]], height: int = 200,
+            points: int = POINTS) -> Any:
+    """Return a figure with a row of named curves over time [s] for each quantity."""
+    figure = rows_over_time(len(rows), height * len(rows) + 80, margin={**MARGIN, 't': 40})
+    colours: dict[str, str] = {}
+    for row, (label, curves) in enumerate(rows.items(), start=1):
+        for name, values in curves.items():
+            times, shown = thinned(time, values, points=points)
+            is_new = name not in colours
+            colour = colours.setdefault(name, LINES[len(colours) % len(LINES)])
+            figure.add_trace(trace(times, shown, name, colour, legendgroup=name,
+                                   showlegend=is_new), row=row, col=1)
+        figure.update_yaxes(title_text=label, row=row, col=1)
     return figure
 
 

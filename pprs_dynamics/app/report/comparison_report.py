@@ -12,7 +12,7 @@ from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
-from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
+from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -110,7 +110,7 @@ def comparison_page(
         Drawn as what the error becomes.
     """
     page = Page('Model against measurement')
-    page.text(sentence(comparison.verdict), 'lead')
+    page.text(comparison.verdict, 'lead')
     page.sources(model.source, [recording.name for recording in recordings])
     statements = comparison.where
     with page.columns():
@@ -125,7 +125,7 @@ def comparison_page(
             else:
                 page.text(NOWHERE)
         if statements:
-            noise = comparison.localisation.drives[statements[0].drive].noise
+            noise = comparison.localisation.noise.get(statements[0].drive)
             picture = noise and figures.along(residuals, noise, statements[0], 'error')
             if picture is not None:
                 page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
@@ -22,14 +23,18 @@ from pprs_dynamics.app.report.comparison_figures import (
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, with_error
-from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.adoption.fit_curve import curve_variable
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
+from pprs_dynamics.inference.diagnosis.statements import UNITS, Statement
+from pprs_dynamics.inference.residuals.profiles import bin_edges, bin_of, error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 POINTS = 400  # of a curve, and of the errors around it
+FINE_BINS = 24
+# Of the variance of an effect, what means over bins of a variable must explain to draw it along it.
+LEAST_TELLING = 0.5
+SPAN = 5.0  # [s], of what is drawn over time
+Integers = np.typing.NDArray[np.int_]
 TIME = {'title': 'time [s]', **charts.SECONDS}
 AFTER, FLOOR, OTHER = '#009E73', '#1a1a1a', '#bbbbbb'
 
@@ -63,7 +68,6 @@ def add_every_drive(page: Page, before: Residuals, after: Residuals,
 
 def curve_with_band(answer: Adoption) -> Any:
     """Return a measured curve over its variable, its band, and the errors without it."""
-    assert isinstance(answer.request, CurveRequest)
     assert answer.curve is not None
     after, curve = answer.residuals_after, answer.curve.curve
     drive = after.drives.index(answer.request.drive)
@@ -126,33 +130,75 @@ def effect_pictures(diagnosis: Diagnosis, found: FoundEffect, remaining: Array,
     The first is over the variable that the effect depends on; the last is over time. `remaining` is
     the residual of the row of the effect, (M, D) [N].
     """
-    part = partial_residual(diagnosis, found, remaining)
-    residuals = diagnosis.residuals
-    drive = residuals.drives[part.drive]
+    d = int(np.argmax(np.sum(found.force ** 2, axis=0)))
+    force, drive = found.force[:, d], diagnosis.residuals.drives[d]
+    residuals = with_error(diagnosis.residuals, remaining + found.force)
     units = residuals.units_of(drive)
     without, hover = 'measured minus the other effects', charts.hover(units)
     layout = {'hovermode': 'x unified', 'yaxis': {
         'title': f'force on {drive} [{units.effort}]', 'rangemode': 'tozero'}}
     figures = []
-    if part.profile is not None:
-        factor, label = axis_of(part.variable, residuals, drive)
-        x = factor * middles(part.profile)
+    variable, noise = _most_telling(residuals, d, force), diagnosis.noise.get(drive)
+    profile = error_profile(residuals, d, variable, noise, FINE_BINS) if (
+        variable and noise is not None) else None
+    if profile is not None:
+        values = residuals.variable(variable, d)
+        assert values is not None
+        factor, label = axis_of(variable, residuals, drive)
+        x = factor * middles(profile)
         figures.append((charts.figure([
-            charts.trace(x, part.profile.mean, without, charts.MEASURED, mode='markers',
+            charts.trace(x, profile.mean, without, charts.MEASURED, mode='markers',
                          marker={'color': charts.MEASURED, 'size': 6}, hovertemplate=hover,
-                         error_y=charts.deviations(part.profile.uncertainty)),
-            charts.trace(x, part.fitted, found.name, charts.MODEL, 2, hovertemplate=hover)],
+                         error_y=charts.deviations(profile.uncertainty)),
+            charts.trace(x, _means(force, bin_of(values, profile.edges), len(profile.mean)),
+                         found.name, charts.MODEL, 2, hovertemplate=hover)],
             320, xaxis_title=label, **layout),
             f'{found.name} on {drive}: means over bins with two standard deviations, and the '
             'fitted effect.'))
-    time = residuals.time[part.span]
+    span = _largest_span(residuals, force)
     figures.append((charts.figure([
-        charts.trace(time, values[part.span].astype(np.float32), name, colour, width,
+        charts.trace(residuals.time[span], values[span].astype(np.float32), name, colour, width,
                      hovertemplate=hover)
-        for name, values, colour, width in ((without, part.error, charts.MEASURED, 1.0),
-                                            (found.name, part.force, charts.MODEL, 2.0))],
+        for name, values, colour, width in (
+            (without, residuals.error[:, d], charts.MEASURED, 1.0),
+            (found.name, force, charts.MODEL, 2.0))],
         320, xaxis=TIME, **layout), f'{found.name} on {drive}, where it changes most.'))
     return figures
+
+
+def with_error(residuals: Residuals, error: Array) -> Residuals:
+    """Return residuals with another error (M, D) [N] of the same model."""
+    return replace(residuals, measured=residuals.model + error, parts={})
+
+
+def _most_telling(residuals: Residuals, drive: int, force: Array) -> str:
+    """Return the variable whose bins explain most of a force's variance; '' for less than half."""
+    best, most = '', LEAST_TELLING * float(np.var(force))
+    for name in UNITS:
+        values = residuals.variable(name, drive)
+        if values is None or name == 'time' or np.ptp(values) == 0:
+            continue
+        place = bin_of(values, bin_edges(values, FINE_BINS))
+        explained = float(np.nanvar(_means(force, place, FINE_BINS)[place]))
+        if explained > most:
+            best, most = name, explained
+    return best
+
+
+def _means(values: Array, place: Integers, count: int) -> Array:
+    """Return the means of values in bins; NaN for an empty bin."""
+    samples = np.bincount(place, minlength=count)
+    total = np.bincount(place, values, minlength=count)
+    means: Array = np.divide(total, samples, out=np.full(len(samples), np.nan), where=samples > 0)
+    return means
+
+
+def _largest_span(residuals: Residuals, force: Array) -> slice:
+    """Return the samples of `SPAN` in which a force changes most."""
+    length = min(len(force), max(2, round(SPAN / residuals.period)))
+    energy = np.concatenate(([0.0], np.cumsum((force - force.mean()) ** 2)))
+    start = int(np.argmax(energy[length:] - energy[:-length]))
+    return slice(start, start + length)
 
 
 def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:

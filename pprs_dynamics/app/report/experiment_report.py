@@ -17,8 +17,8 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 
 Motion = PlatformMotion | JointMotion
-POINTS = 500  # pairs of extremes shown of a curve
-MOST_SHOWN = 12
+Rows = dict[str, dict[str, Array]]  # curves by quantity and name
+MOST_SHOWN, MOST_LIMITS = 12, 6
 HIGH = 0.5  # use of a limit, from which on it is shown
 
 
@@ -33,7 +33,7 @@ def contests_table(experiment: Experiment) -> PlainTable:
 
 def accuracies_table(experiment: Experiment) -> PlainTable:
     """Return numbers with their standard deviations, before and after."""
-    return ('number', 'before', 'after', 'matters from', 'unit'), [
+    return ('parameter', 'std now', 'std after', 'relevant from', 'unit'), [
         (accuracy.label, _number(accuracy.std_before), _number(accuracy.std_after),
          f'{accuracy.scale:.3g}', accuracy.unit)
         for accuracy in experiment.accuracies]
@@ -56,12 +56,13 @@ def experiment_view(experiment: Experiment) -> Any:
         parts.append(titled_table('Expected evidence', contests_table(experiment), right=()))
     if experiment.accuracies:
         headings, rows = accuracies_table(experiment)
-        parts.append(titled_table('Standard deviations', (headings, rows[:MOST_SHOWN]), right=()))
+        parts.append(titled_table('Standard deviations of parameters, now and after this motion',
+                                  (headings, rows[:MOST_SHOWN]), right=(1, 2, 3)))
         if len(rows) > MOST_SHOWN:
             parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json')
     used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
-    parts.append('use of the limits, less their margin: ' + ', '.join(
-        f'{name} {share}' for name, share in used[:6]) + '; all others less')
+    parts.append('Use of the limits: ' + ', '.join(
+        f'{name} {share}' for name, share in used[:MOST_LIMITS]) + '; all others less.')
     return stacked(*parts)
 
 
@@ -74,6 +75,7 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
     motion : PlatformMotion or JointMotion
         Sampled as in the file.
     """
+    assert motion.time is not None
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
     if experiment.contests:
@@ -82,54 +84,38 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
                    'diagnosis of all recordings. The chance is that of the rival no longer '
                    'being reported.')
     if isinstance(motion, PlatformMotion):
-        page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
-                    over_time=True)
+        page.figure(charts.stacked(motion.time, platform_rows(motion)),
+                    'The motion of the platform, from where it starts.', over_time=True)
     with page.fold('Every drive'):
-        page.figure(_drives(experiment, motion),
+        page.figure(charts.stacked(motion.time, drive_rows(experiment, motion)),
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)
     with page.fold('Use of the limits'):
         page.table(('limit', 'use'), limit_rows(experiment),
-                   caption='Use of each limit, less its margin; checked at 500 Hz.')
+                   caption='Share of each limit, less a margin, that the motion uses; checked at '
+                   '500 Hz.')
     if experiment.accuracies:
-        with page.fold('How well numbers would be known'):
+        with page.fold('How well parameters would be known'):
             page.table(*accuracies_table(experiment), caption='Standard '
-                       'deviations. Each uncertain effect is fitted alone with the model. A number '
-                       'matters from the size in the fourth column, which is the tolerance for '
-                       'numbers of the model.')
+                       'deviations (std). Each uncertain effect is fitted alone with the model. '
+                       'A parameter is relevant from the size in the fourth column on; for '
+                       'numbers of the model this is their tolerance.')
     return page
 
 
-def _platform(motion: PlatformMotion) -> Any:
-    moved = motion.position - motion.position[0]
-    return _stacked(motion, (
-        ('position [m]', tuple(zip('xyz', moved.T, strict=True))),
-        ('angle [rad]', (('tilt', motion.tilt), ('turn', motion.turn)))))
+def platform_rows(motion: PlatformMotion) -> Rows:
+    """Return position and orientation of the platform over time, from where it starts."""
+    return {'position [m]': dict(zip('xyz', (motion.position - motion.position[0]).T,
+                                     strict=True)),
+            'angle [rad]': {'tilt': motion.tilt, 'turn': motion.turn}}
 
 
-def _drives(experiment: Experiment, motion: Motion) -> Any:
+def drive_rows(experiment: Experiment, motion: Motion) -> Rows:
+    """Return position, velocity, acceleration and effort of every drive over time."""
     assert motion.time is not None
     forces = experiment.forces(motion.time)
-    state = forces.mechanism
-    return _stacked(motion, tuple(
-        (f'{name} [{common_unit(experiment.model.units, unit).replace("^2", "²")}]',
-         tuple(zip(experiment.model.drives, values.T, strict=True)))
-        for name, unit, values in (
-            ('position', 'm', state.position), ('velocity', 'm/s', state.velocity),
-            ('acceleration', 'm/s^2', state.acceleration), ('effort', 'N', forces.total))))
-
-
-def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...]], ...],
-             ) -> Any:
-    assert motion.time is not None
-    figure = charts.rows_over_time(len(rows), 170 * len(rows) + 80,
-                                   margin={'l': 70, 'r': 15, 't': 40, 'b': 45})
-    colours: dict[str, str] = {}
-    for row, (label, curves) in enumerate(rows, start=1):
-        for name, values in curves:
-            time, shown = charts.thinned(motion.time, values, points=POINTS)
-            is_new = name not in colours
-            colour = colours.setdefault(name, charts.LINES[len(colours) % len(charts.LINES)])
-            figure.add_trace(charts.trace(time, shown, name, colour, legendgroup=name,
-                                          showlegend=is_new), row=row, col=1)
-        figure.update_yaxes(title_text=label, row=row, col=1)
-    return figure
+    state, model = forces.mechanism, experiment.model
+    return {f'{name} [{common_unit(model.units, unit).replace("^2", "²")}]':
+            dict(zip(model.drives, values.T, strict=True))
+            for name, unit, values in (
+                ('position', 'm', state.position), ('velocity', 'm/s', state.velocity),
+                ('acceleration', 'm/s^2', state.acceleration), ('effort', 'N', forces.total))}

@@ -43,7 +43,7 @@ def fit_view(model: DriveModel, fit: BaseFit, details: bool = False) -> Any:
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
     numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
     headline = [escape(f'{word_little(fit.little)}, fitted nevertheless')] if fit.little else []
-    return stacked(*headline, errors, *map(escape, fit.told), *numbers)
+    return stacked(*headline, errors, *map(escape, fit.notes), *numbers)
 
 
 def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
@@ -69,7 +69,7 @@ def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
                 'Error, rms, before (grey) and with the fitted numbers (blue).')
     page.table(*errors_table(model, fit))
     page.text(f'Held out: {HELD_OUT[fit.held_out_on]}.', 'note')
-    page.bullets([sentence(entry) for entry in fit.told])
+    page.bullets([sentence(entry) for entry in fit.notes])
     with page.fold('Every number'):
         page.table(*numbers_table(fit))
     return page

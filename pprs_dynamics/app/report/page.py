@@ -105,11 +105,6 @@ class Page:
         self._body.append(f'<section class="next" aria-label="Next step"><p><b>Next:</b> '
                           f'{escape(text)}{":" if command else "."}</p>{code}</section>')
 
-    def copy(self, label: str, text: str) -> None:
-        """Add a button that copies a text which is not shown."""
-        self._body.append(f'<div class="command copy"><code style="display:none">{escape(text)}'
-                          f'</code><button type="button">{escape(label)}</button></div>')
-
     def record(self, lines: Iterable[tuple[str, str]]) -> None:
         """Add what the page is of, so that it can be filed: labelled lines behind a title."""
         self.heading('Record')
@@ -185,13 +180,13 @@ class Page:
         """Add a Plotly figure; those over time share the span shown and the cursor."""
         self._body.append(self._drawn(figure, caption, over_time))
 
-    def card(self, title: str, lines: Iterable[tuple[str, str]],
-             figures: Iterable[tuple[Any, str]] = ()) -> None:
+    def card(self, lines: Iterable[tuple[str, str]], figures: Iterable[tuple[Any, str]] = (),
+             ) -> None:
         """Add a framed finding: labelled lines, and figures with captions below them."""
         terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
                         for label, text in lines)
         drawn = ''.join(self._drawn(figure, caption, False) for figure, caption in figures)
-        self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
+        self._body.append(f'<section class="card"><dl>{terms}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:

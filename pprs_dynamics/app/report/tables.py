@@ -15,6 +15,7 @@ from pprs_dynamics.drives import CHANNELS, DriveColumns, common_unit
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
+    from pprs_dynamics.arrays import Array
     from pprs_dynamics.drives import DriveUnits, RecordedDrives
     from pprs_dynamics.measurement.files.recording import Recording, Summary
     from pprs_dynamics.physics.model.reproduction import Claim
@@ -32,31 +33,6 @@ def claims_table(claims: Iterable[Claim]) -> Any:
         table.add_row(escape(claim.claim), escape(claim.paper), escape(claim.found),
                       '[green]yes[/]' if claim.reproduced else '[red]no[/]')
     return table
-
-
-def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
-    """Return what is in a recording, drive by drive; drives of one kind in one table."""
-    return [_recording_table(summary, kind, [name for name, entry in zip(
-        summary.drives, units, strict=True) if entry == kind]) for kind in dict.fromkeys(units)]
-
-
-def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
-    position = units.of('m')
-    channels = [name for name in CHANNELS
-                if any(name in summary.drives[drive].channels for drive in drives)]
-    return text_table(
-        ('drive', f'position [{position}]', f'velocity [{position}/s]', f'effort [{units.effort}]',
-         'measured', *(f'{name} [{units.of(CHANNELS[name])}]' for name in channels)),
-        [(escape(drive), *map(_span, (found.position, found.velocity, found.effort)),
-          f'{found.measured:.1%}', *(_span(found.channels.get(name)) for name in channels))
-         for drive in drives for found in [summary.drives[drive]]],
-        caption=escape(summary.source), title=_title(summary))
-
-
-def _title(summary: Summary) -> str:
-    return escape(f'{summary.name}: {summary.used} of {summary.samples} samples in '
-                  f'{counted(len(summary.segments), "segment")}, '
-                  f'{summary.duration:.2f} s at {summary.rate:.6g} Hz')
 
 
 def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
@@ -78,9 +54,14 @@ def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
             if bounds is not None:
                 column = columns.names.get(quantity, f'{joint}/{quantity}')
                 rows.append((escape(str(column)), escape(drive), quantity, unit + (
-                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds)))
-    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows,
-                      caption=escape(summary.source), title=_title(summary))
+                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds) + (
+                        f' ({found.measured:.1%} measured)'
+                        if quantity in ('current', 'effort') and found.measured < 1 else '')))
+    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows, right=(),
+                      caption=escape(summary.source), title=escape(
+                          f'{summary.name}: {summary.used} of {summary.samples} samples in '
+                          f'{counted(len(summary.segments), "segment")}, '
+                          f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
 
 
 def _span(bounds: tuple[float, float] | None) -> str:
@@ -92,16 +73,17 @@ def simulation_view(samples: int, rate: float, hidden: int) -> str:
     return f'{samples} samples at {rate:g} Hz, {hidden} hidden effect{"s" * (hidden != 1)}'
 
 
+def recording_rows(recording: Recording, units: Sequence[DriveUnits],
+                   ) -> dict[str, dict[str, Array]]:
+    """Return positions and efforts of every drive, by quantity."""
+    return {f'{what} [{common_unit(units, unit)}]': dict(
+        zip(recording.drives, values.T, strict=True)) for what, unit, values in (
+            ('position', 'm', recording.position), ('effort', 'N', recording.effort))}
+
+
 def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
     """Return a page with positions and efforts of every drive over time."""
     page = Page(recording.name)
-    for what, unit, values in (('position', 'm', recording.position),
-                               ('effort', 'N', recording.effort)):
-        curves = []
-        for k, name in enumerate(recording.drives):
-            time, shown = charts.thinned(recording.time, values[:, k])
-            curves.append(charts.trace(time, shown, name, charts.LINES[k % len(charts.LINES)]))
-        figure = charts.figure(curves, 320, yaxis_title=f'{what} [{common_unit(units, unit)}]',
-                               xaxis_title='time [s]')
-        page.figure(figure, f'{what.capitalize()} of every drive.', over_time=True)
+    page.figure(charts.stacked(recording.time, recording_rows(recording, units), 300),
+                'Position and effort of every drive.', over_time=True)
     return page

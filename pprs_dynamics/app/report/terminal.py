@@ -125,7 +125,7 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     numbers = range(1, len(headings)) if right is None else right
     for number, heading in enumerate(headings):
         table.add_column(escape(heading), justify='right' if number in numbers else 'left',
-                         no_wrap=number in whole)
+                         no_wrap=number in whole, overflow='fold')
     for row in rows:
         table.add_row(*row)
     return table

@@ -1,74 +1,77 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Adding an effect to a model: its row of the table, the held-out test, and the decision."""
+"""Adding an effect to a model: its row of the table, the held-out test, and the decision.
+
+The values are those of the diagnosis: of the best row that has the effect. What decides is whether
+the new model predicts better, drive by drive in units of the noise.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.fit_curve import (
-    CurveRequest,
     fit_curve,
     held_out_residuals,
     with_curve,
     without_curve,
 )
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
-from pprs_dynamics.inference.adoption.requested_row import (
-    PlacementError,
-    requested_model,
-    requested_row,
-)
 from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import change, listed, plain
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms
+from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
-from pprs_dynamics.inference.search.estimates import calibrations
+from pprs_dynamics.inference.search.estimates import calibrations, estimate_present
+from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
 from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_gain
+from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.effects_block import UNCERTAINTIES
 from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
 
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
+SURE = 2.0  # standard deviations by which a number must differ from 0
 MOVING = 5.0  # widths of reversal, above which a drive moves
 PUSHES = 0.1  # of the moving time, in which friction may give power back
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 
 
 def adopt(
-    model: DriveModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
+    model: DriveModel, request: EffectRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
 
-    The values are those of the diagnosis: of the best set that has the effect. A curve of the same
-    drive that the model has already is replaced.
+    A curve of the same drive that the model has already is replaced.
 
     Parameters
     ----------
     model : DriveModel
-    request : EffectRequest or CurveRequest
+    request : EffectRequest
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -85,30 +88,27 @@ def adopt(
     Raises
     ------
     EffectRequestError
-        For an effect that cannot act in this robot, and for a curve since a reference.
-    CurveError
-        Where the recordings cannot give the curve.
+        For an effect that cannot act in this robot, for a curve since a reference, and where the
+        recordings cannot give the curve.
     PprsError
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    start = model
-    if isinstance(request, EffectRequest):
-        start = original(model)
-        request = request.placed(start)
-    elif reference is not None:
+    if request.variable and reference is not None:
         raise EffectRequestError(f'{request.name}: a curve contains the error of the reference, '
                                  'too; since a reference, request an effect')
-    if diagnosis is None or (diagnosis.selection is None and isinstance(request, EffectRequest)):
+    start = model if request.variable else original(model)
+    request = request.placed(start)
+    if diagnosis is None or not (diagnosis.selection or request.variable):
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSED * share),
                              reference=reference)
     case = _Case(model, recordings, validate, diagnosis, reference)
-    if isinstance(request, CurveRequest):
+    if request.variable:
         found = _with_curve(case, request, report)
     else:
         try:
             found = _with_effect(case, request)
-        except (ModelError, PlacementError) as error:
+        except (ModelError, EffectRequestError) as error:
             force = False
             found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
                 f'its fit gives no model: {error}',))
@@ -148,12 +148,6 @@ class _Case:
         return ('the validation recordings' if self.validate
                 else 'held-out blocks of the recordings')
 
-    @property
-    def table(self) -> ModelTable:
-        """All rows of the diagnosis."""
-        assert self.diagnosis.selection is not None
-        return self.diagnosis.selection
-
     def residuals(self, recordings: Sequence[Recording], *models: DriveModel) -> list[Residuals]:
         """Return the residuals of models, less the error that a reference has as well."""
         found = [measure_residuals(model, recordings)[0] for model in models]
@@ -189,14 +183,15 @@ class _Case:
                f'the fall is {gain.certainty:.2g} standard errors, must be more than {asked:g}')
         return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
 
-    def adoption(self, request: EffectRequest | CurveRequest, after: DriveModel,
+    def adoption(self, request: EffectRequest, after: DriveModel,
                  residuals: Sequence[Residuals], held_out: Sequence[float],
-                 gain: PredictiveGain | None, objections: tuple[str, ...]) -> Adoption:
+                 gain: PredictiveGain | None, objections: tuple[str, ...], **details: Any,
+                 ) -> Adoption:
         """Return the undecided adoption of a model, with all objections.
 
         Parameters
         ----------
-        request : EffectRequest or CurveRequest
+        request : EffectRequest
         after : DriveModel
         residuals : (before, after)
             On the recordings.
@@ -205,6 +200,8 @@ class _Case:
         gain : PredictiveGain or None
             On held-out data.
         objections : tuple of str
+        details
+            Further fields of the adoption.
         """
         before, with_it = residuals
         errors = [rms(before), rms(with_it)]
@@ -216,11 +213,15 @@ class _Case:
                                 before.unit)
                 or self.objections(gain, held_out, self.held_out, before.unit))
         first, last = held_out or errors
-        return Adoption(
-            request, request.drives, self.model, after, before, with_it, first, last,
-            VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floors,
-            self.diagnosis.noise_floor, objections=objections,
-            reference=() if self.reference is None else self.reference.names)
+        return Adoption(**{
+            'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
+            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': first,
+            'held_out_after': last, 'held_out_on': VALIDATION if self.validate else BLOCKS,
+            'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
+            'reference': () if self.reference is None else self.reference.names, **details})
+
+
+# An effect of the catalogue
 
 
 def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
@@ -228,41 +229,43 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
 
     Raises
     ------
-    ModelError, PlacementError
+    ModelError, EffectRequestError
         Where the effect gives no model.
     """
-    diagnosis, table = case.diagnosis, case.table
-    margin = diagnosis.decisions.rival_margin
-    row = requested_row(table, request, margin)
-    answer = Answer(table, row, case.validate, diagnosis.decisions)
-    effect = next(effect for effect in answer.effects if effect.name == request.name)
+    table, name = case.diagnosis.selection, request.name
+    assert table is not None
+    row = requested_row(table, request)
+    answer = Answer(table, row, case.validate)
+    effect = next(effect for effect in answer.effects if effect.name == name)
     after, gone = requested_model(answer, request, effect)
-    refused = [component.drive for component in row.fits.refused(row.fitted)
-               if component.effect is effect.effect]
-    places = listed([answer.drives[d] for d in refused if d is not None])
-    impossible = (f'the values of {request.name} that fit best are impossible'
-                  f'{places and f" on {places}"}: beyond its bounds, or more is taken away than '
-                  'the model has',) if refused else ()
+    objections = list(_of_table(case, request, table, row, effect))
+    if refused := [component.drive for component in row.fits.refused(row.fitted)
+                   if component.effect is effect.effect]:
+        places = listed([answer.drives[d] for d in refused if d is not None])
+        objections.append(f'the values of {name} that fit best are impossible'
+                          f'{places and f" on {places}"}: beyond its bounds, or more is taken away '
+                          'than the model has')
     residuals = case.residuals(case.recordings, case.model, after)
-    pushing = () if gone or not request.effect.is_friction else _of_friction(
-        effect, after, residuals[-1])
-    found = case.adoption(
-        request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
-        (*_of_table(case, request, row, effect), *impossible, *pushing))
+    if request.effect.is_friction and not gone:
+        objections += _of_friction(effect, after, residuals[-1])
     rivals = tuple(dict.fromkeys(
-        other for rival in table.rivals(margin)
-        if request.name in (*rival.missing, *rival.instead)
-        for other in (rival.instead if request.name in rival.missing else rival.missing)))
-    others = [c.name for c in row.effects if c.name != request.name]
-    remarks = [f'{listed(rivals, "or")} explains the data about as well'] if rivals else []
-    remarks += [f'The value of {listed(effect.at_bound)} is at the limit of the values that were '
-                'tried'] if effect.at_bound else []
-    remarks += [f'{request.name}{" of " + place.rstrip(".") if place else ""} is removed from the '
-                'model: the recordings show none of it' for place in gone]
-    remarks += [f'The recordings also show {listed(others)}'] if others else []
-    prefix = f'effects.{request.name}.'
-    return replace(
-        found, drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
+        other for rival in table.rivals(table.first.decisions.rival_margin)
+        if name in (*rival.missing, *rival.instead)
+        for other in (rival.instead if name in rival.missing else rival.missing)))
+    others = [c.name for c in row.effects if c.name != name]
+    remarks = [f'{name}{" of " + place.rstrip(".") if place else ""} is removed from the model: '
+               'the recordings show none of it' for place in gone]
+    if rivals:
+        remarks.insert(0, f'{listed(rivals, "or")} explains the data about as well')
+    if effect.at_bound:
+        remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
+                       'were tried')
+    if others:
+        remarks.append(f'The recordings also show {listed(others)}')
+    prefix = f'effects.{name}.'
+    return case.adoption(
+        request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
+        tuple(objections), drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
         moments=effect.moments, parameters={
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
@@ -270,10 +273,117 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
             answer.fits, answer.fitted) if number.after != number.before))
 
 
-def _of_table(case: _Case, request: EffectRequest, row: Row, effect: FoundEffect,
-              ) -> tuple[str, ...]:
+def requested_row(table: ModelTable, request: EffectRequest) -> Row:
+    """Return the row that answers a request: the best one, a rival, or the effect alone.
+
+    Parameters
+    ----------
+    table : ModelTable
+    request : EffectRequest
+        On its drives the effect is fitted; without drives, where it lowers the cost.
+
+    Raises
+    ------
+    EffectRequestError
+        Where the effect has no force in these recordings.
+    """
+    rows = [table.best, *(rival.row for rival in table.rivals(
+        table.first.decisions.rival_margin))]
+    if request.name in table.alone:
+        rows.append(Row(table.first, table.alone[request.name]))
+    row, found = next(((row, c) for row in rows for c in row.effects if c.name == request.name),
+                      (None, None))
+    fits, rest = table.first, tuple[Candidate, ...]()
+    if row is not None and found is not None:
+        if request.drives in (None, row.fits.design.named(found.drives)):
+            return row if row.is_exact else Row.exact(row.fits, row.fitted)
+        fits, rest = row.fits, row.fitted.without(found)
+    design, scan = fits.design, Scan(fits)
+    offers = scan.offers(fits.evaluate(rest)).get(request.effect, [])
+    if request.drives is None:
+        chosen = scan.best_drives(request.effect, offers, None)[1] if offers else []
+    else:
+        wanted = {design.drives.index(name) for name in request.drives}
+        kept = [c for c in found.components if c.drive in wanted] if found else []
+        wanted -= {component.drive for component in kept}
+        chosen = [*kept, *(component for _, component in offers if component.drive in wanted)]
+    if len(chosen) < len(request.drives or (None,)):
+        standing = [name for name in request.drives or design.drives
+                    if not design.moves(design.drives.index(name))]
+        raise EffectRequestError(f'{", ".join(standing)} hardly moved in the recordings' if standing
+                             else f'{request.name} has no force in these recordings')
+    fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
+    return Row(*linearised(fits, fitted), 0.0)
+
+
+def requested_model(answer: Answer, request: EffectRequest, effect: FoundEffect,
+                    ) -> tuple[DriveModel, tuple[str, ...]]:
+    """Return the input model with the requested effect alone, and where the effect is removed.
+
+    Parameters
+    ----------
+    answer : Answer
+        Of the row that has the effect.
+    request : EffectRequest
+    effect : FoundEffect
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    base, placed = parts_of(answer.fits, answer.fitted)
+    model = model_at(answer.design, base, [
+        each for each in placed if each.effect.name == request.name])
+    given = answer.design.given.values.get('effects.active') or ()
+    known = {request.name: effect.parameters, **{
+        each.name: estimate_present(answer.fits, answer.fitted, each)
+        for each in model.effects if each.name != request.name and each.name in given
+        and isinstance(each, (DriveEffect, StructureEffect))}}
+    values = dict(model.values)
+    for name, parameters in known.items():
+        values.update({
+            f'{UNCERTAINTIES}.{name}.{key}': float(f'{number.std:.3g}')
+            for key, number in parameters.items()
+            if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
+    gone = _gone(answer, request, effect)
+    removed = tuple(f'{block}.{request.name}.{place}' for block in ('effects', UNCERTAINTIES)
+                    for place in gone)
+    values = {key: value for key, value in values.items()
+              if not (removed and key.startswith(removed))}
+    if not any(key.startswith(f'effects.{request.name}.') for key in values):
+        values['effects.active'] = [name for name in values['effects.active']
+                                    if name != request.name]
+    return replace(DriveModel.from_parameters(values), source=model.source), gone
+
+
+@outside_cost('adopt removes an effect of the model of which the recordings show none')
+def _gone(answer: Answer, request: EffectRequest, found: FoundEffect) -> tuple[str, ...]:
+    """Return where the input model has the effect and the recordings show none of it.
+
+    As the beginnings of keys: `drive.`, `link.`, or '' for all of it.
+    """
+    effect, design = request.effect, answer.design
+    candidate = next(c for c in answer.fitted.effects if c.name == effect.name)
+    sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
+        p.name.endswith('mass') or not issubclass(effect, AddedBody))}
+    prefixes = []
+    for component in candidate.components:
+        if design.present(effect, component.drive) is None:
+            continue
+        places = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
+        prefix = (f'{design.drives[component.drive]}.' if component.drive is not None
+                  else ''.join(f'{place}.' for place in places))
+        mine = [number for key, number in found.parameters.items()
+                if key.startswith(prefix) and effect.place_and_parameter(key)[1] in sizes]
+        if mine and all(abs(number.value) <= SURE * number.std for number in mine):
+            prefixes.append(prefix)
+    return tuple(prefixes)
+
+
+def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
+              effect: FoundEffect) -> tuple[str, ...]:
     """Return why the table does not report the requested effect; nothing where it does."""
-    diagnosis, table = case.diagnosis, case.table
     if effect.course is not None:
         return (f'it is there{effect.when} only, and a model has it all the time: record the '
                 'machine in its present state',)
@@ -282,10 +392,10 @@ def _of_table(case: _Case, request: EffectRequest, row: Row, effect: FoundEffect
     if known and (missed := [drive for drive in effect.drives or () if drive not in known]):
         return (f'the recordings show {request.name} on {listed(known)}, not on {listed(missed)}',)
     if best or any(request.name in rival.instead
-                   for rival in table.rivals(diagnosis.decisions.rival_margin)):
+                   for rival in table.rivals(table.first.decisions.rival_margin)):
         return ()
     more = f'the set with {request.name} costs {plain(row.cost - table.best.cost, 2)} more'
-    for first in diagnosis.effects:
+    for first in case.diagnosis.effects:
         on = f' on {listed(first.drives)}' if first.drives else ''
         return (f'{first.name}{on} explains these recordings better: {more}',)
     if request.present(case.model):
@@ -316,7 +426,10 @@ def _of_friction(effect: FoundEffect, model: DriveModel, residuals: Residuals) -
     return ()
 
 
-def _with_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:
+# A measured curve
+
+
+def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], None]) -> Adoption:
     """Return the undecided adoption of a measured curve."""
     model, drive = case.model, request.drive
     bare = without_curve(model, drive)
@@ -341,8 +454,8 @@ def _with_curve(case: _Case, request: CurveRequest, report: Callable[[float], No
         others = listed([effect.name for effect in case.diagnosis.effects])
         remarks.append(f'The recordings also show {others}: adopt causes first, a curve in their '
                        'place is valid for this motion only')
-    return replace(
-        case.adoption(request, after, case.residuals(case.recordings, model, after),
-                      (rms(given), rms(found)), predictive_gain(given, found), against),
+    return case.adoption(
+        request, after, case.residuals(case.recordings, model, after), (rms(given), rms(found)),
+        predictive_gain(given, found), against,
         parameters=fitted.parameters(drive, start.units_of(drive).effort), curve=fitted,
         remarks=tuple(remarks))

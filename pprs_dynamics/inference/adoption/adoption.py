@@ -1,19 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The answer to a requested effect: the model with it, errors before and after, objections."""
+"""The answer to a requested effect, and its entry in the ledger of the model."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from os import PathLike
 from typing import Any
 
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
+from pprs_dynamics import __version__
+from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.inference.adoption.fit_curve import FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.residuals.residuals import Residuals, rms
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
+from pprs_dynamics.system.plain_text import for_json
 
 BLOCKS, VALIDATION = 'blocks', 'validation'
 
@@ -24,7 +33,7 @@ class Adoption:
 
     Parameters
     ----------
-    request : EffectRequest or CurveRequest
+    request : EffectRequest
     drives : tuple of str or None
         On which it was fitted.
     before, after : DriveModel
@@ -36,8 +45,6 @@ class Adoption:
     held_out_on : {'blocks', 'validation'}
     noise_floors : mapping of str to float
         Root of the mean square of the noise of each drive, as the diagnosis has it [N].
-    noise_floor : float
-        The same over drives [N].
     parameters : mapping of str to Estimate
     objections, remarks : tuple of str
     calibrated : tuple of Calibration
@@ -55,7 +62,7 @@ class Adoption:
         Why, in one sentence.
     """
 
-    request: EffectRequest | CurveRequest
+    request: EffectRequest
     drives: tuple[str, ...] | None
     before: DriveModel
     after: DriveModel
@@ -65,7 +72,6 @@ class Adoption:
     held_out_after: float
     held_out_on: str
     noise_floors: Mapping[str, float]
-    noise_floor: float
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     objections: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -93,6 +99,11 @@ class Adoption:
         return rms(self.residuals_after)
 
     @property
+    def noise_floor(self) -> float:
+        """Noise over all drives, rms [N]."""
+        return root_mean_square(list(self.noise_floors.values()))
+
+    @property
     def unit(self) -> str:
         """Unit of errors over all drives."""
         return self.residuals_before.unit
@@ -104,15 +115,72 @@ class Adoption:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON of `pprs adopt`."""
-        moments = {key: estimate.to_dict() for key, estimate in self.moments.items()}
-        return {
+        content: dict[str, Any] = for_json({
             **{name: getattr(self, name) for name in (
                 'adopted', 'reason', 'effect', 'error_before', 'error_after', 'held_out_before',
-                'held_out_after', 'held_out_on', 'noise_floor', 'forced')},
-            'drives': None if self.drives is None else list(self.drives),
-            'objections': list(self.objections), 'remarks': list(self.remarks),
-            'rivals': list(self.rivals),
-            'parameters': {key: estimate.to_dict() for key, estimate in self.parameters.items()},
-            **({'moments': moments} if moments else {}),
-            **({'reference': list(self.reference)} if self.reference else {}),
-            'calibrated': [number.to_dict() for number in self.calibrated]}
+                'held_out_after', 'held_out_on', 'noise_floor', 'forced', 'drives', 'objections',
+                'remarks', 'rivals', 'parameters', 'calibrated')},
+            **{name: value for name in ('moments', 'reference') if (value := getattr(self, name))}})
+        return content
+
+
+@dataclass(frozen=True)
+class RecordingEntry:
+    """A recording as the ledger names it: file, hash, first and last time [s]."""
+
+    name: str
+    sha256: str
+    span: tuple[float, float]
+
+    @classmethod
+    def of(cls, recording: Recording, path: str | PathLike[str] | None = None) -> RecordingEntry:
+        """Return what the ledger says of a recording, which may come from no file."""
+        time = recording.epoch + recording.time
+        sha256 = samples_fingerprint(recording) if path is None else fingerprint(path)
+        return cls(recording.name, sha256, (float(time[0]), float(time[-1])))
+
+
+@dataclass(frozen=True)
+class LedgerBook:
+    """Enters adoptions into a model's ledger.
+
+    Parameters
+    ----------
+    fitted, validation : tuple of RecordingEntry
+    """
+
+    fitted: tuple[RecordingEntry, ...]
+    validation: tuple[RecordingEntry, ...]
+
+    def entered(self, adoption: Adoption) -> DriveModel:
+        """Return the model of an adoption with its step in the ledger."""
+        values = with_step(adoption.before.values, adoption.after.values, self._step(adoption))
+        return replace(DriveModel.from_parameters(values), source=adoption.before.source)
+
+    def _step(self, adoption: Adoption) -> Step:
+        before, after = (rms_by_drive(residuals) for residuals in (
+            adoption.residuals_before, adoption.residuals_after))
+        estimates = adoption.parameters.values()
+        errors: dict[str, Any] = {name: _rounded(getattr(adoption, name)) for name in (
+            'error_before', 'error_after', 'held_out_before', 'held_out_after', 'noise_floor')}
+        return Step(
+            effect=adoption.effect, drives=adoption.drives or (),
+            parameters=tuple(adoption.parameters),
+            values=tuple(estimate.value for estimate in estimates),
+            std=tuple(_rounded(estimate.std, 3) for estimate in estimates),
+            units=tuple(estimate.unit for estimate in estimates),
+            recordings=tuple(entry.name for entry in self.fitted),
+            sha256=tuple(entry.sha256 for entry in self.fitted),
+            spans=tuple(time for entry in self.fitted for time in entry.span),
+            validation=tuple(entry.name for entry in self.validation),
+            validation_sha256=tuple(entry.sha256 for entry in self.validation),
+            reference=adoption.reference, held_out_on=adoption.held_out_on, **errors,
+            measured=tuple(before), drive_errors_before=tuple(map(_rounded, before.values())),
+            drive_errors_after=tuple(map(_rounded, after.values())),
+            calibrated=tuple(number.label for number in adoption.calibrated),
+            rivals=adoption.rivals, objections=adoption.objections, forced=adoption.forced,
+            date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
+
+
+def _rounded(value: float, digits: int = 6) -> float:
+    return float(f'{value:.{digits}g}') if math.isfinite(value) else NOT_KNOWN

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.errors import PprsError, UnknownNameError
+from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
@@ -28,7 +28,6 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
     OF,
     Curve,
     MeasuredCurve,
-    check_variable,
     spline_basis,
 )
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -42,56 +41,6 @@ TURN = 2 * pi
 BLOCKS = 10
 FLEXIBLE = 0.1  # roughness of the curve with which the noise is estimated
 ACTIVE = 'effects.active'
-
-
-class CurveError(PprsError, ValueError):
-    """A curve that recordings cannot give."""
-
-
-@dataclass(frozen=True)
-class CurveRequest:
-    """A request for a measured curve: measured_curve:DRIVE@VARIABLE.
-
-    Parameters
-    ----------
-    drive, variable : str
-        The latter as in the results of a comparison.
-    """
-
-    drive: str
-    variable: str
-
-    @classmethod
-    def of(cls, text: str, known: tuple[str, ...]) -> CurveRequest:
-        """Read DRIVE@VARIABLE.
-
-        Raises
-        ------
-        CurveError, UnknownNameError, ModelError
-            For another form, a drive that is not known, a variable that no curve has.
-        """
-        drive, at, variable = text.partition('@')
-        if not at:
-            raise CurveError(f'measured_curve:{text} must be measured_curve:DRIVE@VARIABLE, e.g. '
-                             f'measured_curve:{known[0]}@position')
-        if drive not in known:
-            raise UnknownNameError('drive', drive, known, 'measured_curve')
-        return cls(drive, check_variable('measured_curve', variable, known))
-
-    @property
-    def drives(self) -> tuple[str]:
-        """The drive alone."""
-        return (self.drive,)
-
-    @property
-    def effect(self) -> type[MeasuredCurve]:
-        """Of the model file."""
-        return MeasuredCurve
-
-    @property
-    def name(self) -> str:
-        """As in results and ledgers."""
-        return f'{MeasuredCurve.name}:{self.drive}@{self.variable}'
 
 
 @dataclass(frozen=True)
@@ -127,23 +76,23 @@ class FittedCurve:
         return band
 
 
-def curve_variable(residuals: Residuals, request: CurveRequest) -> Array:
+def curve_variable(residuals: Residuals, request: EffectRequest) -> Array:
     """Return the variable at every sample of residuals, (M,).
 
     Raises
     ------
-    CurveError
+    EffectRequestError
         Where it is not known of this robot.
     """
     name, _, other = request.variable.partition(' of ')
     drive = residuals.drives.index(other if name in OF and other else request.drive)
     values = residuals.variable(name, drive)
     if values is None:
-        raise CurveError(f'{request.name}: {request.variable} is not known of this robot')
+        raise EffectRequestError(f'{request.name}: {request.variable} is not known of this robot')
     return values
 
 
-def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | None = None,
+def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | None = None,
               ) -> FittedCurve:
     """Return the curve of a drive's error that has the largest evidence.
 
@@ -151,13 +100,13 @@ def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | Non
     ----------
     residuals : Residuals
         Of the model that the curve joins.
-    request : CurveRequest
+    request : EffectRequest
     left_out : slice, optional
         Samples that are not fitted.
 
     Raises
     ------
-    CurveError
+    EffectRequestError
         Where the variable does not vary, or the drive was not measured.
     """
     drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
@@ -168,12 +117,13 @@ def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | Non
     try:
         regression = Regression(residuals, drives=(drive,))
     except ResidualsError:
-        raise CurveError(f'{request.name}: {request.drive} was not measured, or at few samples '
-                         'only') from None
+        raise EffectRequestError(f'{request.name}: {request.drive} was not measured, or at few '
+                                 'samples only') from None
     seen = x[np.isfinite(residuals.measured[:, drive])]
     start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
     if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
-        raise CurveError(f'{request.name}: {request.variable} hardly varies in the recordings')
+        raise EffectRequestError(
+            f'{request.name}: {request.variable} hardly varies in the recordings')
     turns = bool(request.variable.startswith('position') and seen.max() - seen.min() >= TURN
                  and residuals.units_of(request.drive).position == 'rad')
     if turns:
@@ -203,7 +153,7 @@ def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | Non
 
 
 def held_out_residuals(
-    residuals: Residuals, request: CurveRequest,
+    residuals: Residuals, request: EffectRequest,
     report: Callable[[float], None] = lambda share: None,
 ) -> Residuals:
     """Return residuals whose model has the curve, in each block from a fit to the others."""

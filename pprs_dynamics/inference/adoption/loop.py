@@ -13,12 +13,13 @@ from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
+from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.plain_text import for_json
 
 MOST_STEPS = 8
 REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
@@ -36,15 +37,12 @@ class AdoptionRun:
     reason : str
     model : DriveModel
         With all that was adopted.
-    last : Diagnosis
-        Of the model where the run ended.
     """
 
     steps: tuple[Adoption, ...]
     ended: str
     reason: str
     model: DriveModel
-    last: Diagnosis
 
     @property
     def adopted(self) -> tuple[Adoption, ...]:
@@ -53,8 +51,9 @@ class AdoptionRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the run for JSON."""
-        return {'ended': self.ended, 'reason': self.reason,
-                'steps': [step.to_dict() for step in self.steps]}
+        content: dict[str, Any] = for_json(
+            {'ended': self.ended, 'reason': self.reason, 'steps': self.steps})
+        return content
 
 
 def adopt_all(
@@ -93,7 +92,8 @@ def adopt_all(
     report = progress or (lambda what, share: None)
     steps: list[Adoption] = []
     refused: list[Adoption] = []
-    decisions = DECISIONS if diagnosis is None else diagnosis.decisions
+    decisions = (DECISIONS if diagnosis is None or diagnosis.selection is None
+                 else diagnosis.selection.first.decisions)
     if original(model) is not model:
         diagnosis = None
     while True:
@@ -103,7 +103,7 @@ def adopt_all(
                                  reference=reference)
         found = _next(diagnosis, {step.effect for step in refused})
         if found is None or sum(step.adopted for step in steps) == MOST_STEPS:
-            return AdoptionRun(tuple(steps), *_end(diagnosis, refused), model, diagnosis)
+            return AdoptionRun(tuple(steps), *_end(diagnosis, refused), model)
         name = found.name
         step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
                      progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
@@ -112,13 +112,11 @@ def adopt_all(
         if not step.adopted:
             refused.append(step)
             continue
-        model = record(step)
-        refused.clear()
+        model, refused, diagnosis = record(step), [], None
         if step.rivals:
-            reason = (f'{", ".join(step.rivals)} would explain these recordings as well as {name}: '
-                      'pprs next-experiment designs the motion that separates them')
-            return AdoptionRun(tuple(steps), AMBIGUOUS, reason, model, diagnosis)
-        diagnosis = None
+            return AdoptionRun(tuple(steps), AMBIGUOUS, (
+                f'{listed(step.rivals, "or")} explains these recordings as well as {name}. Another '
+                'motion separates them'), model)
 
 
 def _end(diagnosis: Diagnosis, refused: Sequence[Adoption]) -> tuple[str, str]:
@@ -127,15 +125,14 @@ def _end(diagnosis: Diagnosis, refused: Sequence[Adoption]) -> tuple[str, str]:
         return REFUSED, '; '.join(f'{step.effect}: {step.reason}' for step in refused)
     if diagnosis.verdict != 'unknown':
         return 'adequate', 'the remaining error does not differ from noise'
-    if diagnosis.depends_on:
-        return 'unknown', ('no effect of the catalogue explains what remains: '
-                           f'{diagnosis.depends_on[0].text}')
-    return 'unknown', 'the remaining error is larger than the noise, and no effect is supported'
+    return 'unknown', (
+        f'no effect of the catalogue explains what remains: {diagnosis.depends_on[0].text}'
+        if diagnosis.depends_on else
+        'the remaining error is larger than the noise, and no effect is supported')
 
 
 def _next(diagnosis: Diagnosis, refused: Set[str]) -> FoundEffect | None:
     """Return what to adopt: those that are certain first, an ambiguous one as the last."""
-    new = [effect for effect in diagnosis.effects if effect.name not in refused]
     ambiguous = {name for names in diagnosis.indistinguishable for name in names}
-    certain = [effect for effect in new if effect.name not in ambiguous]
-    return next(iter(certain or new), None)
+    new = [effect for effect in diagnosis.effects if effect.name not in refused]
+    return min(new, key=lambda effect: effect.name in ambiguous, default=None)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Requests for an effect: EFFECT, or EFFECT:drive,drive; parsed and checked."""
+"""Requests for an effect: EFFECT, EFFECT:drive,drive or measured_curve:DRIVE@VARIABLE."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import PprsError, suggestion
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
+from pprs_dynamics.errors import PprsError, UnknownNameError, suggestion
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
+from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve, check_variable
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 class EffectRequestError(PprsError, ValueError):
-    """An effect or drive that does not exist."""
+    """An effect or drive that does not exist, or that the recordings cannot give."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +30,17 @@ class EffectRequest:
     effect : type of CatalogueEffect
     drives : tuple of str or None
         On which; None: where the recordings call for it.
+    variable : str
+        Of a measured curve, as in the results of a comparison; '' for any other effect.
     """
 
     effect: type[CatalogueEffect]
     drives: tuple[str, ...] | None = None
+    variable: str = ''
 
     @classmethod
     def of(cls, text: str, known: tuple[str, ...] = DRIVES) -> EffectRequest:
-        """Read EFFECT or EFFECT:drive,drive, of the drives that are known.
+        """Read a request for the drives that are known.
 
         Raises
         ------
@@ -46,6 +48,14 @@ class EffectRequest:
             For an effect or a drive that does not exist.
         """
         name, colon, listed = text.partition(':')
+        if name == MeasuredCurve.name:
+            drive, at, variable = listed.partition('@')
+            if not at:
+                raise EffectRequestError(f'{text} must be measured_curve:DRIVE@VARIABLE, e.g. '
+                                         f'measured_curve:{known[0]}@position')
+            if drive not in known:
+                raise UnknownNameError('drive', drive, known, name)
+            return cls(MeasuredCurve, (drive,), check_variable(name, variable, known))
         return cls.named(name, [drive.strip() for drive in listed.split(',')] if colon else None,
                          known)
 
@@ -83,6 +93,8 @@ class EffectRequest:
         EffectRequestError
             Where it cannot act there.
         """
+        if self.variable:
+            return self
         if not model.offers(self.effect):
             offered = [name for name, effect in catalogue().items() if model.offers(effect)]
             raise EffectRequestError(f'{self.name} does not act in {model.title}, must be one of '
@@ -91,8 +103,15 @@ class EffectRequest:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
-        return self.effect.name
+        """Of the effect, as in results and ledgers."""
+        return f'{self.effect.name}:{self.drive}@{self.variable}' if (
+            self.variable) else self.effect.name
+
+    @property
+    def drive(self) -> str:
+        """The drive of a measured curve."""
+        assert self.drives is not None
+        return self.drives[0]
 
     def present(self, model: DriveModel) -> bool:
         """Return whether the model has it already, on every drive that is asked for if any is."""
@@ -101,15 +120,12 @@ class EffectRequest:
             for effect in model.effects)
 
 
-def requested(text: str, model: DriveModel) -> EffectRequest | CurveRequest:
-    """Read EFFECT, EFFECT:drive,drive or measured_curve:DRIVE@VARIABLE for a model.
+def requested(text: str, model: DriveModel) -> EffectRequest:
+    """Read a request for a model.
 
     Raises
     ------
     PprsError
-        As `EffectRequest.of`, `EffectRequest.placed` and `CurveRequest.of`.
+        As `EffectRequest.of` and `EffectRequest.placed`.
     """
-    name, _, rest = text.partition(':')
-    if name == MeasuredCurve.name:
-        return CurveRequest.of(rest, model.drives)
     return EffectRequest.of(text, model.drives).placed(model)

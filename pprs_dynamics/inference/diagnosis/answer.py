@@ -14,10 +14,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import (
+from pprs_dynamics.inference.diagnosis.diagnosis import (
+    Diagnosis,
     FoundEffect,
-    RankedEffect,
     RankedSet,
     RivalEffect,
 )
@@ -34,7 +33,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
+from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
     averaged,
@@ -90,12 +89,11 @@ class Answer:
         The reported one.
     validate : sequence of Recording
         Held-out recordings; blocks of the fitted ones without any.
-    decisions : Decisions
     """
 
-    def __init__(self, table: ModelTable, row: Row, validate: Sequence[Recording],
-                 decisions: Decisions) -> None:
-        self.table, self.row, self.validate, self.decisions = table, row, validate, decisions
+    def __init__(self, table: ModelTable, row: Row, validate: Sequence[Recording]) -> None:
+        self.table, self.row, self.validate = table, row, validate
+        self.decisions = table.first.decisions
         self.fits, self.fitted = row.fits, row.fitted
         self.design, self.given = row.fits.design, table.first.design.residuals
         self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
@@ -148,18 +146,15 @@ class Answer:
                    else 'ambiguous' if rivals else 'effect' if effects else 'adequate')
         moved = [number for number in calibrations(self.fits, self.fitted)
                  if abs(number.after - number.before) > self.decisions.sure * number.std]
-        refit = root_mean_square(self.remaining + sum(
-            (effect.force for effect in effects), np.zeros_like(self.remaining)))
         first = table.first.design
         return Diagnosis(
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
-            tuple(self._ranked_set(row.fitted, row.terms) for row in table.rows[:MOST_SETS]),
+            tuple(self._ranked(row.fitted, row.terms) for row in table.rows[:MOST_SETS]),
             self._barred(), tuple(moved),
             find_cautions(table.last, table.reported, effects, self.noise_levels),
             first.notes, first.given, self.adopted, self.given, self.remaining, self.noise,
-            self.noise_levels, root_mean_square(list(self.noise_levels.values())), refit, above,
-            little, self.unseen, 'validation' if self.validate else 'blocks', selection=table,
-            decisions=self.decisions)
+            self.noise_levels, above, little, self.unseen,
+            'validation' if self.validate else 'blocks', selection=table)
 
     # Effects
 
@@ -186,7 +181,7 @@ class Answer:
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
             gain, self._objection(less / max(with_force, 1e-300), gain),
-            self._ranked_set(without.fitted, without.terms), self._in_model(candidate, parameters),
+            self._ranked(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
@@ -296,7 +291,7 @@ class Answer:
                     f'{drive}: its error changes from {begin:.4g} s to {end:.4g} s alone, by '
                     f'{plain(size)} {residuals.units_of(drive).effort} rms, as of a contact, a '
                     f'stop or a hand ({candidate.name} explains it): it is no property of the '
-                    'machine', evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
+                    'machine', evidence, 'range', float(np.mean(force[:, d] ** 2)))
 
     def _evidence(self, candidate: EffectCandidate | UnknownCandidate) -> float:
         """Return by how much the set of the row costs more without a candidate."""
@@ -322,48 +317,49 @@ class Answer:
                     rivals[name] += [other for other in rival.instead if other not in rivals[name]]
         return tuple((name, *others) for name, others in rivals.items() if others)
 
-    def _candidates(self) -> tuple[RankedEffect, ...]:
+    def _candidates(self) -> tuple[RankedSet, ...]:
         """Return the effects that were fitted as the only one, the best first."""
         first = self.table.first
-        none = first.evaluate(()).cost
-        return tuple(self._ranked(Row(first, fitted), fitted.effects[0], none - fitted.cost)
+        none = first.evaluate(()).terms
+        return tuple(self._ranked(fitted, fitted.terms, none, linear_error(first, fitted))
                      for fitted in self.table.alone.values())
 
-    def _suspects(self) -> tuple[RankedEffect, ...]:
+    def _suspects(self) -> tuple[RankedSet, ...]:
         """Return effects nearly worth their prior cost in addition to the reported ones."""
-        return tuple(self._ranked(row, candidate, self.table.best.cost - row.cost)
-                     for candidate, row in self.table.suspects(self.decisions.suspect_margin))
+        return tuple(replace(
+            self._ranked(row.fitted, row.terms),
+            names=((candidate.name, self.design.named(candidate.drives)),))
+            for candidate, row in self.table.suspects(self.decisions.suspect_margin))
 
-    def _ranked(self, row: Row, candidate: EffectCandidate, evidence: float) -> RankedEffect:
-        return RankedEffect(candidate.name, self.design.named(candidate.drives), evidence,
-                            linear_error(row.fits, row.fitted))
-
-    def _ranked_set(self, fitted: CandidateSet, terms: CostTerms) -> RankedSet:
+    def _ranked(self, fitted: CandidateSet, terms: CostTerms, other: CostTerms | None = None,
+                error_after: float = np.nan) -> RankedSet:
+        """Return a set with its cost above other terms, by default those of the best row."""
         names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
-        return RankedSet(names, terms - self.table.best.terms, fitted.barred)
+        return RankedSet(names, terms - (other or self.table.best.terms), fitted.barred,
+                         error_after)
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return inadmissible sets that would be rivals or better, the cheapest of each names."""
         found: dict[frozenset[str], RankedSet] = {}
         for fitted in self.table.barred(self.decisions.rival_margin):
             found.setdefault(frozenset(candidate.name for candidate in fitted.candidates),
-                             self._ranked_set(fitted, fitted.terms))
+                             self._ranked(fitted, fitted.terms))
         return tuple(found.values())[:MOST_BARRED]
 
 
-def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decisions) -> Diagnosis:
+def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
     """Return the answer of a table: that of the row of least cost.
 
     Where an effect of it is not confirmed, the verdict is `unknown`, and the answer is that of the
     row without it.
     """
-    answer = Answer(table, table.best, validate, decisions)
+    answer = Answer(table, table.best, validate)
     unconfirmed = unconfirmed_effects(answer)
     if unconfirmed:
         names = {effect.name for effect in unconfirmed}
         rest = tuple(c for c in table.best.fitted.candidates if c.name not in names)
         fits = table.best.fits
-        answer = Answer(table, Row(fits, fits.evaluate(rest), 0.0), validate, decisions)
+        answer = Answer(table, Row(fits, fits.evaluate(rest), 0.0), validate)
     return answer.diagnosis(unconfirmed)
 
 
@@ -393,7 +389,7 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
         for name in names:
             row = next(row for row in table.rows if reported[of] not in row.placed_names
                        and any(name in (c.name, c.placed_name) for c in row.effects))
-            answer = Answer(table, row, validate, diagnosis.decisions)
+            answer = Answer(table, row, validate)
             candidate = next(c for c in answer.fitted.effects
                              if name in (c.name, c.placed_name))
             found.append(RivalEffect(answer.found(candidate), of, row.cost - table.best.cost,

@@ -10,13 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component
+from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_model import reversal_forces
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 
@@ -28,7 +26,7 @@ def find_cautions(
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_length(fits, best), *_motion(fits), *_filtered(fits),
             *_reversals(fits, best, noise_levels), *_second_encoders(fits, effects),
-            *_unexcited(fits, best), *_one_load(fits, effects))
+            *_unexcited(fits, best))
 
 
 def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
@@ -127,25 +125,3 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
                         else f'{term.effect.name} ({", ".join(names)})')
     if weak:
         yield f'this motion hardly excites {listed(weak)}: no statement about them is possible'
-
-
-def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
-    """Yield friction by load that hardly differs from friction that does not follow the load."""
-    share = fits.decisions.one_load
-    for effect in effects:
-        other = catalogue().get(effect.effect.at_one_load)
-        if other is None or not issubclass(other, DriveEffect):
-            continue
-        alike = []
-        for name in effect.drives or ():
-            d = fits.design.drives.index(name)
-            rows = np.concatenate([fits.components.term(Component.of(
-                other, d, {}, names)).rows[d] for names in other.variants[-1:]])
-            moving = fits.design.moving(d) & np.isfinite(effect.force[:, d])
-            wanted, columns = effect.force[moving, d], rows[:, moving]
-            rest = wanted - np.linalg.lstsq(columns.T, wanted, rcond=None)[0] @ columns
-            if root_mean_square(rest) < share * root_mean_square(wanted):
-                alike.append(name)
-        if alike:
-            yield (f'{effect.name} and {other.name} on {listed(alike)} differ by less than '
-                   f'{share:.0%}, because the load hardly varies. Record another load')

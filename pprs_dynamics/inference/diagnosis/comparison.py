@@ -1,26 +1,159 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The error of a model per drive and over all drives, in numbers and in words."""
+"""The error of a model per drive and over all drives, in numbers and words, and where it lies.
+
+Noise, criterion and patterns of the places are those of the search for missing effects, without
+any effect. The pattern that lowers the cost most is stated first. The columns of its variable then
+join the fit, until no pattern lowers the cost.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.localisation import DriveFindings, Localisation, localise
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent, word_little
-from pprs_dynamics.inference.diagnosis.statements import Statement
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.noise_floors import noise_at_most
-from pprs_dynamics.system.numbers import finite
+from pprs_dynamics.inference.search.scan import with_fast_noise
+from pprs_dynamics.inference.search.unknown import DrivePatterns
+from pprs_dynamics.system.parallel import each
+from pprs_dynamics.system.plain_text import for_json
+
+MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
+ROUNDING = 1e-9  # of the effort, below which a difference is no error
+MOST_STATEMENTS = 3  # per drive
+PROPOSALS = 4  # fitted in full, of each scan
+PLACES = ('range', 'directed_range', 'fast')  # patterns that say where an error lies
+PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """Where the error lies, and the noise of the drives.
+
+    Parameters
+    ----------
+    statements : tuple of Statement
+        Of all drives, by evidence.
+    noise : mapping of str to NoiseSpectrum
+        Of what remains of the error of each drive; not of drives with too few samples.
+    """
+
+    statements: tuple[Statement, ...]
+    noise: Mapping[str, NoiseSpectrum]
+
+
+def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
+             ) -> Localisation:
+    """Return where the error of each drive lies, as far as noise would not do the same.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Averaged to at most 16 000 samples first; what is faster than that is not seen.
+    progress : callable, optional
+        Called with the share of the work that is done.
+    """
+    thin = residuals.thinned(MOST_SAMPLES)
+    statements: list[Statement] = []
+    noise: dict[str, NoiseSpectrum] = {}
+    done: list[int] = []
+
+    def search_drive(drive: int) -> None:
+        found = _search(thin, drive)
+        if found is not None:
+            statements.extend(found[0])
+            noise[thin.drives[drive]] = found[1]
+        done.append(drive)
+        if progress:
+            progress(len(done) / len(thin.drives))
+
+    each(search_drive, range(len(thin.drives)))
+    return Localisation(tuple(sorted(
+        statements, key=lambda statement: -statement.evidence)), noise)
+
+
+def _search(residuals: Residuals, drive: int) -> tuple[list[Statement], NoiseSpectrum] | None:
+    """Return the statements on a drive and its noise; None with too few samples or no error."""
+    try:
+        regression = Regression(residuals, drives=(drive,))
+    except ResidualsError:
+        return None
+    error, measured = residuals.error[:, drive], residuals.measured[:, drive]
+    if np.nanmax(np.abs(error)) <= ROUNDING * np.nanmax(np.abs(measured)):
+        return None
+    prior_costs = replace(PriorCosts.of(regression, DECISIONS), drives=len(residuals.drives))
+    drive_patterns = DrivePatterns(regression, prior_costs, drive, with_plain_forms=True)
+    fit = regression.fit(())
+    statements: list[Statement] = []
+    blocks: list[Block] = []
+    while len(statements) < MOST_STATEMENTS:
+        winner = _best(drive_patterns, fit, blocks,
+                       {statement.variable for statement in statements})
+        if winner is None:
+            break
+        candidate, found, evidence, other_variables = winner
+        statements.append(word_statement(drive_patterns, candidate, found.of(
+            candidate.parts[drive]), evidence, other_variables))
+        blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
+        fit = regression.fit(blocks, found.amplitudes)
+    return statements, regression.noise(fit)[drive]
+
+
+def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], stated: set[str],
+          ) -> tuple[UnknownCandidate, JointFit, float, tuple[str, ...]] | None:
+    """Return the pattern that lowers the cost most, with its fit, evidence and other_variables."""
+    regression = drive_patterns.regression
+    chosen: dict[object, tuple[UnknownCandidate, JointFit]] = {}
+    for near in (fit, with_fast_noise(regression, fit)):
+        for candidate, score in drive_patterns.proposals(near, PROPOSALS, always=True):
+            variable = candidate.family.variable
+            if (variable in stated and candidate.pattern.kind != 'line') or score < PROPOSED:
+                continue
+            chosen.setdefault(candidate.key, (candidate, near))
+    scored = []
+    for candidate, near in chosen.values():
+        refined = drive_patterns.refined(candidate, near)
+        if refined.pattern.kind in PLACES and np.mean(
+                refined.rows[drive_patterns.d][0] != 0) > MOST_SHARE:
+            continue
+        found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
+        scored.append((fit.deviance - found.deviance - refined.prior_cost, refined, found))
+    scored.sort(key=lambda scored: -scored[0])
+    if not scored or scored[0][0] <= 0:
+        return None
+    evidence, winner, found = scored[0]
+    margin = drive_patterns.prior_costs.decisions.rival_margin
+    kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
+    other_variables = [rival.family.variable for score, rival, _ in scored
+                       if score > evidence - margin and rival.family.variable not in kin]
+    return winner, found, evidence, tuple(dict.fromkeys(other_variables))
+
+
+def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Block]:
+    """Return all columns that the variable of a statement can carry, as one block each."""
+    if winner.pattern.kind in ('line', 'offset'):
+        return []
+    variables = {winner.family.variable}
+    if winner.family.variable in ('velocity', 'direction'):
+        variables = {'velocity', 'direction'}
+    return [drive_patterns.family_block(family) for family in drive_patterns.families
+            if family.variable in variables and not family.paired]
 
 
 @dataclass(frozen=True)
@@ -119,9 +252,8 @@ class Beside:
 
     def to_dict(self) -> dict[str, Any]:
         """Return name and errors."""
-        return {'name': self.name, 'drives': {name: {'rms': finite(value)}
-                                              for name, value in self.drives.items()},
-                'overall': {'rms': finite(self.rms)}}
+        return {'name': self.name, 'overall': {'rms': self.rms},
+                'drives': {name: {'rms': value} for name, value in self.drives.items()}}
 
 
 @dataclass(frozen=True)
@@ -168,37 +300,37 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The numbers over all drives in words."""
+        """The numbers over all drives, in at most two sentences."""
         share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
         little = f'{word_little(self.little)}; ' if self.little else ''
         error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
+        error = error[:1].upper() + error[1:]
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
         known = [drive for drive in beyond if drive.noise_floor is not None]
         if self.relative < DECISIONS.negligible:
-            return f'{error}: negligible'
+            return f'{error}, which is negligible.'
         if not beyond:
             placed = sorted({place.drive for place in self.where})
-            return f'{error}, all of it noise' + (f' except on {listed(placed)}' if placed else '')
+            return f'{error}. It is noise{f", except on {listed(placed)}" if placed else ""}.'
         worst = (max(known, key=lambda drive: drive.unexplained) if known else
                  max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300)))
         where = 'every drive' if len(beyond) == len(self.drives) > 1 else listed(
             [drive.drive for drive in beyond])
-        what = 'more than noise' if known else 'the noise is not known'
-        unexplained = ' unexplained' if known else ''
-        return (f'{error}; {what} on {where}. Worst is {worst.drive}, '
-                f'{in_unit(worst.unexplained, worst.unit)}{unexplained} ({worst.grade})')
+        what = 'it is more than noise' if known else 'the noise is not known'
+        worst_is = f'; the worst is {worst.drive} with ' if len(beyond) > 1 else ': '
+        return (f'{error}. On {where} {what}{worst_is}{in_unit(worst.unexplained, worst.unit)}'
+                f'{" unexplained" if known else ""} ({worst.grade}).')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
-        return {
-            'drives': {name: {key: finite(getattr(drive, key))
-                              for key in ('rms', 'relative', 'bias', 'peak')}
-                       for name, drive in self.drives.items()},
-            'overall': {'rms': finite(self.rms), 'relative': finite(self.relative)},
-            'explained': {name: finite(drive.explained_variance)
-                          for name, drive in self.drives.items()},
+        content: dict[str, Any] = for_json({
+            'drives': {name: {key: getattr(drive, key) for key in (
+                'rms', 'relative', 'bias', 'peak')} for name, drive in self.drives.items()},
+            'overall': {'rms': self.rms, 'relative': self.relative},
+            'explained': {name: drive.explained_variance for name, drive in self.drives.items()},
             'noise_floors': {name: drive.noise_floor for name, drive in self.drives.items()},
-            'where': [statement.to_dict() for statement in self.where]}
+            'where': self.where})
+        return content
 
 
 def compare(residuals: Residuals, localisation: Localisation | None = None,
@@ -236,12 +368,12 @@ def _compare_drive(
     known = np.isfinite(residuals.measured[:, index])
     error, effort = residuals.error[known, index], residuals.measured[known, index]
     rms, swing = root_mean_square(error), root_mean_square(effort - effort.mean())
-    findings = where.drives.get(name, DriveFindings((), None))
-    noise = findings.noise
+    noise = where.noise.get(name)
     if floor is not None and noise is not None and noise.period == residuals.period:
         # What no pattern explains is an upper bound of the noise.
         floor = noise_at_most(floor, noise.rms)
-    most = max((statement.mean_square for statement in findings.statements), default=0.0)
+    most = max((statement.mean_square for statement in where.statements
+                if statement.drive == name), default=0.0)
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
         float('nan') if np.isnan(share) else rms / swing, share, len(error), floor,

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
@@ -68,13 +68,13 @@ def diagnose(
     other, sticking = ({}, {}) if as_it_is else _gate(model, recordings, decisions, reference)
     if other or sticking:
         table = input_model_alone(model, recordings, decisions, report)
-        bare = Answer(table, table.best, validate, decisions).diagnosis()
+        bare = Answer(table, table.best, validate).diagnosis()
         return replace(bare, verdict='unknown', warnings=(), depends_on=(),
                        effort_looks_like=other, stick_slip=sticking)
     table = tabulate(model, recordings, decisions, lambda share: report(0.9 * share),
                      None if reference is None else reference.carried_over)
     since = None if reference is None else SinceReference.of(reference, table.first.design)
-    found = replace(answer_of(table, validate, decisions), since=since)
+    found = replace(answer_of(table, validate), since=since)
     report(1.0)
     return found
 
@@ -108,36 +108,29 @@ def other_mounting(model: DriveModel, recordings: Sequence[Recording],
         return {}
     residuals = measure_residuals(model, recordings)[0]
     q, v, a = (residuals.variables[name] for name in ('position', 'velocity', 'acceleration'))
-    still = np.zeros_like(q)
 
     def weight(gravity: Array) -> Array:
-        """Return the efforts that hold the robot at rest, (M, D)."""
+        """Return the efforts at rest, (M, D)."""
         robot = replace(model.robot, gravity=tuple(gravity.tolist()))
-        held: Array = replace(model, robot=robot, effects=()).drive_forces(
-            JointMotion(q, still, still, residuals.time)).total
-        return held
+        efforts: Array = replace(model, robot=robot, effects=()).drive_forces(
+            JointMotion(q, 0.0 * q, 0.0 * q, residuals.time)).total
+        return efforts
 
     nothing = weight(np.zeros(3))
     columns = np.stack([weight(axis) - nothing for axis in size * np.eye(3)], axis=2)
-    error = residuals.error + columns @ (given / size)
-    rows, targets, before = [], [], []
-    for d in range(len(model.drives)):
-        known = np.isfinite(error[:, d])
-        own = np.stack((v[:, d], np.sign(v[:, d]), a[:, d], np.ones(len(q))), axis=1)[known]
-
-        def rest(y: Array, own: Array = own) -> Array:
-            """Return what the drive's inertia, friction and offset do not explain."""
-            left: Array = y - own @ np.linalg.lstsq(own, y, rcond=None)[0]
-            return left
-
-        now = rest(residuals.error[known, d])
-        scale = max(float(np.sqrt(np.mean(now ** 2))), 1e-300) if len(now) else 1.0
-        before.append(now / scale)
-        rows.append(rest(columns[known, d]) / scale)
-        targets.append(rest(error[known, d]) / scale)
+    own = np.stack((v, np.sign(v), a, np.ones_like(v)), axis=2)
+    rows, targets = [], []
+    for d in np.flatnonzero(np.isfinite(residuals.error).any(axis=0)):
+        at = np.isfinite(residuals.error[:, d])
+        y = np.column_stack((residuals.error[at, d], columns[at, d]))
+        # What the drive's inertia, friction and offset do not explain.
+        rest = y - own[at, d] @ np.linalg.lstsq(own[at, d], y, rcond=None)[0]
+        rest /= max(root_mean_square(rest[:, 0]), 1e-300)
+        rows.append(rest[:, 1:])
+        targets.append(rest[:, 0] + rest[:, 1:] @ (given / size))
     share = np.linalg.lstsq(np.concatenate(rows), np.concatenate(targets), rcond=1e-3)[0]
-    is_explained = all(np.sum((y - G @ share) ** 2) < MOST_LEFT * np.sum(now ** 2)
-                       for G, y, now in zip(rows, targets, before, strict=True) if np.any(G))
+    is_explained = all(np.mean((target - G @ share) ** 2) < MOST_LEFT
+                       for G, target in zip(rows, targets, strict=True) if np.any(G))
     norm = float(np.linalg.norm(share))
     tilt = float(np.arccos(np.clip(share @ given / max(norm * size, 1e-300), -1.0, 1.0)))
     if abs(norm - 1) > SAME_SIZE or tilt < LEAST_TILT or not is_explained:

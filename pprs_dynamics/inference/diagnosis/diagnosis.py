@@ -5,34 +5,206 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import nan
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.diagnosis.detectable import DetectableSize, detectable_sizes
-from pprs_dynamics.inference.diagnosis.found_effects import (
-    FoundEffect,
-    RankedEffect,
-    RankedSet,
-)
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.efforts import kinds_of
 from pprs_dynamics.inference.readings.findings import NoMeasurement
+from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.estimates import Calibration
+from pprs_dynamics.inference.search.candidates import (
+    SINCE,
+    CandidateSet,
+    Component,
+    CostTerms,
+    Course,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.components import placed
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.explained_effort import explained_shares
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.numbers import finite
+from pprs_dynamics.system.plain_text import for_json
+
+Drives = tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects with its cost.
+
+    Parameters
+    ----------
+    names : tuple of (name, drives)
+        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
+    terms : CostTerms
+        Of its cost, less those of the set that it is compared with.
+    barred : str
+        Why it may not be, whatever it costs; '' where it may.
+    error_after : float
+        Error with it, by linear forces [N]; NaN where that is not asked.
+    """
+
+    names: tuple[tuple[str, Drives], ...]
+    terms: CostTerms
+    barred: str = ''
+    error_after: float = nan
+
+    @property
+    def cost(self) -> float:
+        """Above that of the other set; lower is better."""
+        return self.terms.total
+
+    @property
+    def name(self) -> str:
+        """Names of its effects."""
+        return ' and '.join(name for name, _ in self.names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of `sets` in the JSON."""
+        return {'cost': self.cost, 'terms': self.terms.to_dict(), 'effects': [
+            {'name': name, 'drives': drives} for name, drives in self.names],
+            **({'barred': self.barred} if self.barred else {})}
+
+    def alone(self) -> dict[str, Any]:
+        """Return the JSON of a set of one effect."""
+        (name, drives), = self.names
+        return {'name': name, 'drives': drives, 'evidence': -self.cost}
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect of a row of the table.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+        On which it sits; None for the structure.
+    parameters : dict of str to Estimate
+    force : (M, D) array
+        What it contributes [N].
+    evidence : float
+        Cost of the best set without it, less that of the best set.
+    error_before, error_after : float
+        Without its force, all else as it was fitted, and with it [N].
+    held_out_before, held_out_after : float
+        On held-out data: fitted without it, and with it [N].
+    at_bound : tuple of str
+        Parameters whose value is none: at the edge of what was tried.
+    share : float
+        By which its force alone lowers the error, over the error of the input model: of the root
+        mean square over drives, each in units of its noise.
+    gain : PredictiveGain, optional
+        By how much the reported effects predict held-out data better than without it; None where
+        that is unknown.
+    objection : str
+        Why data refute it, as a clause; '' where they do not.
+    without : RankedSet, optional
+        The best set without it, against the best one with it.
+    in_model : mapping of str to float
+        What the given model says of the parameters, where it has the effect: then the recordings
+        say something else. Empty for an effect that it lacks.
+    course : Course or None
+        When it is there, from the start of the first recording [s]; None: all the time.
+    moments : mapping of str to Estimate
+        First moments of added bodies: see `Estimates`.
+    """
+
+    effect: type[CatalogueEffect]
+    drives: Drives
+    parameters: dict[str, Estimate]
+    force: Array
+    evidence: float
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    at_bound: tuple[str, ...] = ()
+    share: float = 0.0
+    gain: PredictiveGain | None = None
+    objection: str = ''
+    without: RankedSet | None = None
+    in_model: Mapping[str, float] = field(default_factory=dict)
+    course: Course | None = None
+    moments: Mapping[str, Estimate] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Links or joints that it is on, each with those that no motion separates from it."""
+        return self.effect.places_of(self.parameters)
+
+    @property
+    def certainty(self) -> float:
+        """Standard errors of the held-out gain; NaN where that is unknown."""
+        return float('nan') if self.gain is None else self.gain.certainty
+
+    @property
+    def when(self) -> str:
+        """When it is there, as the end of a clause; '' where that is all the time."""
+        if self.course is None:
+            return ''
+        if self.course.kind == SINCE:
+            return f' since {self.course.begin:.4g} s'
+        return f', growing from nothing at the start to this at {self.course.end:.4g} s'
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        course, moments, in_model = self.course, self.moments, self.in_model
+        content: dict[str, Any] = for_json({
+            'name': self.name, 'drives': self.drives,
+            'alike': [names for names in self.places if len(names) > 1],
+            'since': course.begin if course and course.kind == SINCE else None,
+            'course': course and course.kind, 'parameters': self.parameters,
+            **({'moments': moments} if moments else {}),
+            **({'in_model': in_model} if in_model else {}),
+            'without': self.without, 'held_out_certainty': self.certainty,
+            **{key: getattr(self, key) for key in (
+                'evidence', 'error_before', 'error_after', 'held_out_before', 'held_out_after')}})
+        return content
+
+
+@dataclass(frozen=True)
+class RivalEffect:
+    """An effect that would explain the recordings about as well as a reported one.
+
+    Parameters
+    ----------
+    found : FoundEffect
+        In the row of the rival.
+    of : str
+        The reported effect.
+    cost : float
+        Of its row, above that of the reported row.
+    remaining : (M, D) array
+        Residual of its row [N].
+    """
+
+    found: FoundEffect
+    of: str
+    cost: float
+    remaining: Array
 
 
 @dataclass(frozen=True)
@@ -63,21 +235,20 @@ class SinceReference:
     def of(cls, reference: Reference, design: Design) -> SinceReference:
         """Return it for a design with a reference."""
         assert design.carried is not None
-        left = design.residuals.error
-        whole = left + design.carried.shown(design.residuals)
-        before, after = (np.nansum(one ** 2, axis=0) for one in (whole, left))
+        error = design.residuals.error
+        before, after = (np.nansum(forces ** 2, axis=0) for forces in (
+            error + design.carried.shown(design.residuals), error))
         explained = {drive: max(0.0, 1 - float(after[d] / before[d]))
                      for d, drive in enumerate(design.drives) if before[d] > 0}
-        here, there = (np.sqrt(np.nanmean(one.variables['velocity'] ** 2, axis=0))
-                       for one in (design.residuals, reference.regression.residuals))
+        here, there = (np.sqrt(np.nanmean(residuals.variables['velocity'] ** 2, axis=0))
+                       for residuals in (design.residuals, reference.regression.residuals))
         moved = there > 0
         pace = float(np.median(here[moved] / there[moved])) if moved.any() else 1.0
         return cls(reference.names, design.carried.covered, explained, pace, reference.note)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        return {'recordings': list(self.recordings), 'covered': self.covered,
-                'explained': dict(self.explained), 'pace': self.pace}
+        return {key: value for key, value in vars(self).items() if key != 'note'}
 
 
 @dataclass(frozen=True)
@@ -94,7 +265,8 @@ class Diagnosis:
     unconfirmed : tuple of FoundEffect
         Fitted as well, but no machine can have them, or the error does not fall with them, or not
         on held-out data.
-    candidates, suspects : tuple of RankedEffect
+    candidates, suspects : tuple of RankedSet
+        Each effect alone against none, and each as one more against the reported set.
     depends_on : tuple of Statement
         What no effect explains.
     sets : tuple of RankedSet
@@ -116,10 +288,6 @@ class Diagnosis:
         By drive.
     noise_floors : mapping of str to float
         Root of the mean square of the noise of each drive [N].
-    noise_floor : float
-        The same over drives [N].
-    refit : float
-        Error with the fitted numbers of the model but without the effects [N].
     above_noise : mapping of str to float
         Residual of a drive over its noise, where the reported effects do not explain it.
     little : mapping of str to float
@@ -136,16 +304,14 @@ class Diagnosis:
         The reference run since which changes are reported; None: what the model lacks.
     selection : ModelTable, optional
         All rows that were fitted.
-    decisions : Decisions
-        With which it was made.
     """
 
     verdict: str
     effects: tuple[FoundEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unconfirmed: tuple[FoundEffect, ...]
-    candidates: tuple[RankedEffect, ...]
-    suspects: tuple[RankedEffect, ...]
+    candidates: tuple[RankedSet, ...]
+    suspects: tuple[RankedSet, ...]
     depends_on: tuple[Statement, ...]
     sets: tuple[RankedSet, ...]
     barred: tuple[RankedSet, ...]
@@ -158,8 +324,6 @@ class Diagnosis:
     remaining: Array
     noise: dict[str, NoiseSpectrum]
     noise_floors: dict[str, float]
-    noise_floor: float
-    refit: float = np.nan
     above_noise: Mapping[str, float] = field(default_factory=dict)
     little: Mapping[str, float] = field(default_factory=dict)
     unseen_noise: tuple[str, ...] = ()
@@ -168,7 +332,6 @@ class Diagnosis:
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
     since: SinceReference | None = None
     selection: ModelTable | None = field(default=None, repr=False, compare=False)
-    decisions: Decisions = DECISIONS
 
     @cached_property
     def detectable(self) -> tuple[DetectableSize, ...]:
@@ -178,40 +341,117 @@ class Diagnosis:
             return ()
         return detectable_sizes(self.selection.last, self.selection.reported)
 
+    @cached_property
+    def noise_floor(self) -> float:
+        """Root of the mean square of `noise_floors` [N]."""
+        return root_mean_square(list(self.noise_floors.values()))
+
+    @cached_property
+    def refit(self) -> float:
+        """Error with the fitted numbers of the model but without the effects [N]."""
+        return root_mean_square(sum((effect.force for effect in self.effects), self.remaining))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
-        return {
-            'verdict': self.verdict,
-            'effects': [effect.to_dict() for effect in self.effects],
+        content: dict[str, Any] = for_json({
+            **{key: getattr(self, key) for key in (
+                'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'barred',
+                'depends_on', 'calibrated', 'detectable', 'held_out_on', 'above_noise',
+                'noise_floor', 'noise_floors', 'warnings')},
             'refit': {'error_before': root_mean_square(self.residuals.error),
-                      'error_after': finite(self.refit)},
-            'indistinguishable': [list(names) for names in self.indistinguishable],
-            'unconfirmed': [effect.to_dict() for effect in self.unconfirmed],
-            'candidates': [candidate.to_dict() for candidate in self.candidates],
-            'depends_on': [
-                {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
-                 'range': None if s.range is None else list(s.range), 'text': s.text}
-                for s in self.depends_on],
-            'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
-                         for s in self.suspects],
-            'sets': [fitted.to_dict() for fitted in self.sets],
-            'barred': [ranked.to_dict() for ranked in self.barred],
-            'calibrated': [number.to_dict() for number in self.calibrated],
-            'detectable': [detectable.to_dict() for detectable in self.detectable],
-            'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
-            'effort_looks_like': kinds_of(self.effort_looks_like),
+                      'error_after': self.refit},
+            'candidates': [{**ranked.alone(), 'error_after': ranked.error_after}
+                           for ranked in self.candidates],
+            'suspects': [ranked.alone() for ranked in self.suspects],
             'stick_slip': {drive: {'frequency': slip.frequency, 'speed': slip.speed,
                                    'step': slip.step, 'share_of_time': slip.share}
                            for drive, slip in self.stick_slip.items()},
-            'explained': _for_json(explained_shares(self.residuals)),
-            'little_explained': dict(self.little),
-            'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
-            'reference': None if self.since is None else self.since.to_dict(),
-            'changed_since': None if self.since is None else [
-                effect.name for effect in self.effects],
-            'noise_floor': self.noise_floor,
-            'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
+            'effort_looks_like': kinds_of(self.effort_looks_like),
+            'explained': explained_shares(self.residuals), 'little_explained': self.little,
+            'explained_after': explained_shares(self.residuals, self.remaining),
+            'reference': self.since,
+            'changed_since': self.since and [effect.name for effect in self.effects]})
+        return content
 
 
-def _for_json(shares: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: finite(share) for name, share in shares.items()}
+@dataclass(frozen=True)
+class DetectableSize:
+    """The smallest size at which an effect would have been reported, by drive or structure.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drive : str or None
+    parameter : Parameter
+        The one number that it has.
+    size : float
+        Of that.
+    unit : str
+    """
+
+    effect: type[CatalogueEffect]
+    drive: str | None
+    parameter: Parameter
+    size: float
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of `detectable` in the JSON."""
+        return {'name': self.effect.name, 'drive': self.drive, 'parameter': self.parameter.name,
+                'size': self.size, 'unit': self.unit}
+
+
+def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[DetectableSize, ...]:
+    """Return the smallest sizes at which effects of one number would have been reported.
+
+    Each alone in addition to a set, at its noise. The deviance must fall by the prior cost of the
+    effect and the margin of rivals, and its force must exceed the form errors of the others. For
+    a coefficient c of information S and prior precision L the deviance falls by
+    (c S)^2 / (S + L) - ln(1 + S / L).
+
+    Parameters
+    ----------
+    fits : FittedSets
+    fitted : CandidateSet
+        Whose effects and those of the given model are left out.
+    """
+    known = {effect.name for effect in fits.design.given.effects} | {
+        candidate.name for candidate in fitted.effects}
+    found = []
+    for component in _of_one_number(fits):
+        if component.effect.name in known:
+            continue
+        block = fits.components.block(component)
+        information = float(fits.regression.own_information(fitted.fit, block)[0, 0])
+        prior = float(block.precision[0, 0])
+        if information <= prior:  # the recordings say less of it than is expected anyway
+            continue
+        candidate = EffectCandidate.of([component])
+        asked = (fits.components.prior_cost(candidate).total
+                 + fits.decisions.rival_margin + np.log1p(information / prior))
+        beside, _ = fits.form_errors.beside(fitted, candidate, set(block.rows), False)
+        c = np.array([max(np.sqrt(asked * (information + prior)) / information,
+                          np.sqrt(beside / information))])
+        units = units_of(fits.design.given, component.drive)
+        values = component.values(c)
+        numbers = [p for p in component.effect.linear if values[p.name]]
+        if not component.is_within(c, units) or len(numbers) != 1:
+            continue  # no machine has so much of it; a body somewhere else has a place as well
+        (parameter,) = numbers
+        drive = None if component.drive is None else fits.design.drives[component.drive]
+        found.append(DetectableSize(component.effect, drive, parameter,
+                                    abs(values[parameter.name]), units.of(parameter.unit)))
+    return tuple(found)
+
+
+def _of_one_number(fits: FittedSets) -> Iterator[Component]:
+    """Yield the effects that have a number and no shape, on each drive that they may be on."""
+    components = fits.components
+    yield from (component for component in (*components.structure, *components.spanning)
+                if len(component.names) == 1 and not component.shape and not (
+                    issubclass(component.effect, MeasurementEffect)
+                    and component.effect.not_linear_in))
+    for d, local in components.local.items():
+        for effect in local.effects:
+            if not effect.shape and len(effect.variants) == len(effect.variants[0]) == 1:
+                yield placed(fits.design, effect, d, {}, effect.variants[0])

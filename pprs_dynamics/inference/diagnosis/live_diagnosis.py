@@ -12,7 +12,7 @@ maximum-likelihood change point between two known models (Hinkley, Biometrika 57
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache
@@ -22,8 +22,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import (
     with_drives,
     with_uncertainty,
@@ -35,6 +34,7 @@ from pprs_dynamics.inference.search.held_out import predictive_gain, sample_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.plain_text import for_json
 
 # Standard errors by which a change must lower the error of the next window. With ten blocks in a
 # window, 2 accept one wrong effect in 30; two windows must report it as well.
@@ -56,27 +56,26 @@ class LiveEffect:
     ----------
     found : FoundEffect
         As the latest window that names it has it.
+    names : frozenset of str
+        Its name and those of its rivals.
     since : float or None
         When it began [s], on the stream's clock; None where it was there from the start.
     confirmed : bool
         Whether it was confirmed on a window that it was not fitted to.
-    names : frozenset of str
-        Its name and those of its rivals.
     """
 
     found: FoundEffect
-    since: float | None
-    confirmed: bool
     names: frozenset[str]
+    since: float | None = None
+    confirmed: bool = False
 
     def is_same(self, other: LiveEffect) -> bool:
         """Return whether two windows mean the same: one of both's names, on the same drives."""
-        return (bool({self.found.name} & other.names | {other.found.name} & self.names)
+        return ((self.found.name in other.names or other.found.name in self.names)
                 and self.found.drives == other.found.drives)
 
     def sentence(self, every: tuple[str, ...]) -> str:
         """Return what changed in words; `every` names all drives."""
-        what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
         given = self.found.in_model
         values = ', '.join(
             f'{key} {with_uncertainty(estimate.value, estimate.std, estimate.unit)}'
@@ -85,6 +84,7 @@ class LiveEffect:
             for key, estimate in list(self.found.parameters.items())[:MOST_VALUES])
         since = 'from the start' if self.since is None else (
             f'since {datetime.fromtimestamp(self.since):%H:%M:%S}')
+        what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
         return f'{what}: {values}, {since}'
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,24 +94,19 @@ class LiveEffect:
 
 @dataclass(frozen=True)
 class Window:
-    """One window of the stream with what its diagnosis says.
+    """What the diagnosis of one window of the stream says.
 
     Parameters
     ----------
-    recording : Recording
-    start, end : float
-        [s], on the stream's clock.
+    span : (float, float)
+        Begin and end [s], on the stream's clock.
     diagnosis : dict
         JSON of `pprs diagnose`.
-    adopted : DriveModel
-        The model with the reported effects and its fitted numbers.
-    plain : DriveModel
-        The same without the reported effects.
+    adopted, plain : DriveModel
+        The model with its fitted numbers, with the reported effects and without them.
     """
 
-    recording: Recording
-    start: float
-    end: float
+    span: tuple[float, float]
     diagnosis: Mapping[str, Any]
     adopted: DriveModel
     plain: DriveModel
@@ -158,27 +153,25 @@ class LiveDiagnosis:
 
         Numbers of a window were fitted together: they are valid only with all of its effects.
         """
-        if self.last is None or not self.effects or not all(
-                effect.confirmed for effect in self.effects):
-            return {}
-        named = {effect['name'] for effect in self.last.diagnosis['effects']}
-        if {effect.found.name for effect in self.effects} != named:
+        names = {effect.found.name for effect in self.effects}
+        if self.last is None or not names or self.claimed != self.effects or names != {
+                effect['name'] for effect in self.last.diagnosis['effects']}:
             return {}
         return dict(self.last.adopted.values)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON of `pprs diagnose` on the latest window, with since and confirmed."""
-        content = dict(self.last.diagnosis) if self.last is not None else {}
-        return {**content, 'effects': [effect.to_dict() for effect in self.effects],
-                'withdrawn': [effect.to_dict() for effect in self.withdrawn],
-                'confirmed': bool(self.claimed),
-                'since': min((effect.since for effect in self.claimed
-                              if effect.since is not None), default=None),
-                'text': '; '.join(filter(None, [
-                    word_little(content.get('little_explained', {}), ' with the reported effects'),
-                    *(effect.sentence(self.model.drives) for effect in self.claimed)])),
-                'window': [self.last.start, self.last.end] if self.last else None,
-                'note': self.note}
+        latest = {} if self.last is None else self.last.diagnosis
+        little = word_little(latest.get('little_explained', {}), ' with the reported effects')
+        content: dict[str, Any] = for_json({
+            **latest, 'effects': self.effects, 'withdrawn': self.withdrawn,
+            'confirmed': bool(self.claimed), 'note': self.note,
+            'since': min((effect.since for effect in self.claimed if effect.since is not None),
+                         default=None),
+            'text': '; '.join(filter(None, [little, *(
+                effect.sentence(self.model.drives) for effect in self.claimed)])),
+            'window': self.last and self.last.span})
+        return content
 
     def with_window(self, recording: Recording, start: float) -> LiveDiagnosis:
         """Return what is known with one more window.
@@ -198,28 +191,24 @@ class LiveDiagnosis:
         if share_in_motion(recording.time, recording.position, MOVING) < LEAST_MOTION:
             return replace(self, withdrawn=(), note='the robot hardly moves: no diagnosis')
         answer = diagnose(self.model, [recording], reference=self.reference)
-        window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
-                        answer.to_dict(), answer.adopted,
-                        without_found(self.model, answer))
+        window = Window((start, start + float(recording.time[-1] - recording.time[0])),
+                        answer.to_dict(), answer.adopted, without_found(self.model, answer))
+        recent = (*self.recent, (recording, start))
         holds = self._holds(recording)
-        beginning = cache(lambda: self._beginning(window))
-        effects = []
+        effects, beginning = [], cache(lambda: beginning_of(window, recent))
         for found in answer.effects:
-            effect = LiveEffect(found, None, False, _names(answer, found))
+            effect = LiveEffect(found, frozenset({found.name}).union(*(
+                names for names in answer.indistinguishable if found.name in names)))
             known = next((present for present in self.effects if present.is_same(effect)), None)
-            if known is not None and known.confirmed:
-                effect = replace(effect, since=known.since, confirmed=True)
-            elif known is not None and holds:
-                effect = replace(effect, since=beginning(), confirmed=True)
+            if known is not None and (known.confirmed or holds):
+                effect = replace(effect, confirmed=True,
+                                 since=known.since if known.confirmed else beginning())
             effects.append(effect)
-        missed = [present for present in self.effects if present.confirmed
-                  and not any(present.is_same(effect) for effect in effects)]
+        missed = [present for present in self.claimed
+                  if not any(present.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.
-        if holds:
-            effects += missed
-        return replace(self, effects=tuple(effects), last=window, note='',
-                       recent=(*self.recent, (recording, start))[-RECENT:],
-                       withdrawn=() if holds else tuple(missed))
+        return replace(self, effects=(*effects, *(missed if holds else ())), last=window, note='',
+                       recent=recent[-RECENT:], withdrawn=() if holds else tuple(missed))
 
     def _holds(self, recording: Recording) -> bool:
         """Return whether the model of the last window predicts a recording better.
@@ -233,15 +222,16 @@ class LiveDiagnosis:
             predictive_gain(measure_residuals(model, [recording])[0], after).confirms(CERTAINTY)
             for model in (self.model, self.last.plain))
 
-    def _beginning(self, window: Window) -> float | None:
-        """Return when the change that a window has came, in this or a recent one [s]."""
-        gains, times = [], []
-        for each, start in (*self.recent, (window.recording, window.start)):
-            before, _ = measure_residuals(window.plain, [each])
-            after, _ = measure_residuals(window.adopted, [each])
-            gains.append(sample_gains(before, after)[0].sum(axis=1))
-            times.append(start + before.time - before.time[0])
-        return change_point(np.concatenate(times), np.concatenate(gains))
+
+def beginning_of(window: Window, recent: Sequence[tuple[Recording, float]]) -> float | None:
+    """Return when the change that a window has came, in recent windows [s]."""
+    gains, times = [], []
+    for recording, start in recent:
+        before, after = (measure_residuals(model, [recording])[0]
+                         for model in (window.plain, window.adopted))
+        gains.append(sample_gains(before, after)[0].sum(axis=1))
+        times.append(start + before.time - before.time[0])
+    return change_point(np.concatenate(times), np.concatenate(gains))
 
 
 def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
@@ -271,9 +261,3 @@ def change_point(time: Array, gains: Array) -> float | None:
     cumulated = np.concatenate(([0.0], np.cumsum(gains)))
     first = int(np.argmin(cumulated))
     return None if first == 0 else float(time[min(first, len(time) - 1)])
-
-
-def _names(answer: Diagnosis, effect: FoundEffect) -> frozenset[str]:
-    """Return the names under which a window may know an effect: its own and its rivals'."""
-    return frozenset({effect.name}).union(*(
-        names for names in answer.indistinguishable if effect.name in names))

@@ -159,6 +159,9 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                         'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
         return ('Look at that place on the machine. Repeat the motion and diagnose both '
                 'recordings: an error that repeats is the machine', both)
+    if diagnosis.above_noise:
+        return ('Repeat the motion and diagnose both recordings: an error that repeats is the '
+                'machine', both)
     if diagnosis.verdict == 'ambiguous':
         if all(_need_another_load(names) for names in diagnosis.indistinguishable):
             return ('Repeat the motion with another load: only friction by load grows with it. '

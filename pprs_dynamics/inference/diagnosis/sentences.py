@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
-from pprs_dynamics.inference.diagnosis.found_effects import (
-    Drives,
+from pprs_dynamics.inference.diagnosis.diagnosis import (
+    Diagnosis,
     FoundEffect,
     RankedSet,
     RivalEffect,
+    SinceReference,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -47,6 +47,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFri
 MOST_CHANGED = 4  # values of an effect of the input model that a sentence compares
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 LEAST_TERM = 0.05  # of a cost, that one digit shows
+WHOLE = 20  # difference of costs from which it is rounded to a whole number
 VAGUE = 0.1  # relative uncertainty of a mass, beyond which its first moment is given if surer
 MOSTLY = 0.95  # of a recording, from which on a reference covers its states
 # Ratio of speeds beyond which lags depend on the speed: at half the speed a real arm shows delays
@@ -150,8 +151,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
-        tuple(f'{_placed(diagnosis, suspect.name, suspect.drives)}: possible, but slow noise '
-              f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
+        tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
+              f'explains the data as well (evidence {-suspect.cost:.0f}, threshold 0). '
               'Repeat the recording' for suspect in diagnosis.suspects),
         tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
               for ranked in diagnosis.barred),
@@ -193,32 +194,35 @@ def word_detectable(diagnosis: Diagnosis) -> str:
 # Sets of effects
 
 
-def _placed(diagnosis: Diagnosis, name: str, drives: Drives) -> str:
-    unknown, comma, variable = name.partition(', ')
-    name = f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
-    return with_drives(name, drives, diagnosis.residuals.drives)
-
-
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
-    return ' and '.join(_placed(diagnosis, *name) for name in ranked.names) or 'nothing missing'
+    found = []
+    for name, drives in ranked.names:
+        unknown, _, variable = name.partition(', ')
+        found.append(with_drives(
+            f'a pattern {place_of(variable)}' if variable and unknown == 'unknown' else name,
+            drives, diagnosis.residuals.drives))
+    return ' and '.join(found) or 'nothing missing'
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the best sets of effects in words, each with its cost above the best, and terms."""
-    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
+    return [(_set(diagnosis, fitted), _rise(fitted.cost) if number else 'the best',
              word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
 
 
 def word_terms(terms: CostTerms) -> str:
     """Return the visible terms of a difference of costs."""
-    return ', '.join(f'{name} {"-" if value < 0 else "+"} {abs(value):.1f}'
-                     for name, value in terms.to_dict().items() if abs(value) >= LEAST_TERM)
+    return ', '.join(f'{name} {_rise(value)}' for name, value in terms.to_dict().items()
+                     if abs(value) >= LEAST_TERM)
+
+
+def _rise(cost: float) -> str:
+    """Return a difference of costs with its sign: a tenth matters where it is small."""
+    return f'{cost:+.1f}' if abs(cost) < WHOLE else f'{cost:+.0f}'
 
 
 def _cost(ranked: RankedSet) -> str:
-    why = word_terms(ranked.terms)
-    return (f'costs {abs(ranked.cost):.1f} {"less" if ranked.cost < 0 else "more"}'
-            + (f': {why}' if why else ''))
+    return f'costs {_rise(ranked.cost)[1:]} {"less" if ranked.cost < 0 else "more"}'
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
@@ -229,7 +233,8 @@ def runner_up(diagnosis: Diagnosis) -> str:
     best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
     others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
     others.sort(key=lambda ranked: best <= set(ranked.names))
-    return f'{_set(diagnosis, others[0])}: {_cost(others[0])}' if others else ''
+    return (f'{_set(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
+            if others else '')
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:

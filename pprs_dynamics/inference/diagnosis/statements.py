@@ -84,12 +84,8 @@ class Statement:
         By which the cost rises without it.
     kind : str
         Of pattern, see `patterns.Pattern`.
-    amplitude : float
-        Size of the pattern [N].
     mean_square : float
         Of the pattern over the record [N^2].
-    other_variables : tuple of str
-        Other variables that do nearly as well.
     """
 
     drive: str
@@ -100,9 +96,7 @@ class Statement:
     text: str
     evidence: float
     kind: str
-    amplitude: float
     mean_square: float
-    other_variables: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
@@ -146,23 +140,21 @@ def word_statement(
         if pattern.kind == 'fading':
             held = np.abs(drive_patterns.values(variable)) < limits[1]
         share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    amplitude = float(np.hypot(*coefficients)) if candidate.family.paired else float(
-        np.abs(coefficients).max())
     signed = float(coefficients[0])
     if pattern.kind == 'fading':
         # Its coefficient belongs to a standstill, which hardly any sample is as near as.
-        amplitude = float(np.abs(shape).max())
-        signed = float(np.copysign(amplitude, signed))
+        signed = float(np.copysign(np.abs(shape).max(), signed))
     elif pattern.limits is not None:
         # The mean error there, which the table and a plot show; the coefficient is what this
         # pattern has beside the others that overlap it.
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
-    text = _sentence(variable, pattern, drive_patterns, signed, amplitude, share, time, shape)
+    size = float(np.linalg.norm(coefficients))
+    text = _sentence(variable, pattern, drive_patterns, signed, size, share, time, shape)
     if other_variables:
         others = listed([in_words(name) for name in other_variables], 'or')
         text += f'; {others} explains it about as well'
     return Statement(drive, variable, limits, share, time, f'{drive}: {text}', evidence,
-                     pattern.kind, amplitude, float(np.mean(shape ** 2)), other_variables)
+                     pattern.kind, float(np.mean(shape ** 2)))
 
 
 def _sentence(
@@ -176,9 +168,9 @@ def _sentence(
     if kind == 'offset':
         return f'its mean error is {with_sign(signed)} {effort} ({of})'
     if kind == 'friction':
-        much = 'little' if signed > 0 else 'much'
+        amount = 'little' if signed > 0 else 'much'
         return (f'its error has the sign of the motion, {size} {effort} ({of}): the model has too '
-                f'{much} friction')
+                f'{amount} friction')
     if kind == 'ripple':
         factor, place = read_in('position', units)
         return (f'its error repeats every {plain(pattern.scale * factor)} {place} of position, '

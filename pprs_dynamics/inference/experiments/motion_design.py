@@ -17,18 +17,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
+from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
+from pprs_dynamics.physics.three_pprs.robot import condition_number
 
+REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from
+WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
+SLIDE_SPEED = 0.5  # [m/s], of the 3-PPRS, whose file has no limit of speed
 DRAWS, STEPS = 40, 160  # random motions, and steps from the best
 FIRST, LAST = 0.3, 0.03  # size of the steps, relative to the largest coefficient
 HALVINGS = 7
@@ -40,6 +44,106 @@ OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
 HARMONICS, HIGHEST_FREQUENCY = (4, 8, 16), 1.5
 SMALLEST = 0.2  # share of the largest excursion of a coordinate; small motion shows hysteresis
 Random = np.random.Generator
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Limits of a motion in addition to those of the model file. Collisions are not checked.
+
+    Parameters
+    ----------
+    velocity : float or None
+        Of every drive [m/s, rad/s]; None: 0.5 for the 3-PPRS, that of the URDF for others.
+    acceleration : float
+        Of every drive [m/s^2, rad/s^2].
+    tilt : float
+        Of the platform of the 3-PPRS against the horizontal [rad].
+    condition_number : float
+        Of the drive Jacobian of the 3-PPRS. Towards a singularity small errors of the model grow
+        large, and a few moments there would carry all the evidence.
+    margin : float
+        Share of every limit that is left unused, 0 to 0.9.
+    effort_reserve : float
+        Taken off the efforts for what the model does not know of [N, N m].
+    """
+
+    velocity: float | None = None
+    acceleration: float = 5.0
+    tilt: float = 0.35
+    condition_number: float = 8.0
+    margin: float = 0.1
+    effort_reserve: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ('velocity', 'acceleration', 'tilt', 'condition_number'):
+            if getattr(self, name) is not None and not getattr(self, name) > 0:
+                raise ModelError(name, getattr(self, name), 'be greater than 0')
+        if not 0 <= self.margin <= 0.9:
+            raise ModelError('margin', self.margin, 'lie between 0 and 0.9')
+
+    def middle(self, model: DriveModel) -> Array:
+        """Return the coordinates about which a robot moves.
+
+        Of the 3-PPRS the pose in the middle of its strokes, of others the positions of its joints.
+        """
+        if model.moves_joints:
+            return self._room(model)[0]
+        geometry = model.robot.geometry
+        lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
+            np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
+        rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
+        height = self._room(model)[0][-1] + geometry.elbow_sign * rise
+        return np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
+
+    def excursions(self, model: DriveModel, position: Array, velocity: Array,
+                   acceleration: Array) -> Array:
+        """Return the excursion of each coordinate, over the largest that a search starts from."""
+        found: Array = np.abs(position - self.middle(model)).max(axis=0) / REACH if (
+            not model.moves_joints) else np.max([share.max(axis=0) for share in self._of_drives(
+                model, position, velocity, acceleration).values()], axis=0)
+        return found
+
+    def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
+        """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
+        state, left = forces.mechanism, 1 - self.margin
+        shares = self._of_drives(model, state.position, state.velocity, state.acceleration)
+        shares['effort'] = (np.abs(forces.total) + self.effort_reserve) / (
+            left * model.limits.efforts)
+        found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
+                 for d, drive in enumerate(model.drives)}
+        return {name: float(share.max()) for name, share in (
+            found if model.moves_joints else {**found, **self._of_platform(model, state)}).items()}
+
+    def _of_drives(self, model: DriveModel, position: Array, velocity: Array,
+                   acceleration: Array) -> dict[str, Array]:
+        """Return the use of range, speed and acceleration of every drive, (N, D) each."""
+        middle, reach = self._room(model)
+        usual = np.inf if model.moves_joints else SLIDE_SPEED
+        fastest = np.minimum(model.speed_limits, self.velocity or usual)
+        return {name: np.abs(values) / ((1 - self.margin) * bound) for name, values, bound in (
+            ('range', position - middle, np.maximum(reach, 1e-12)),
+            ('velocity', velocity, fastest), ('acceleration', acceleration, self.acceleration))}
+
+    def _of_platform(self, model: DriveModel, state: Any) -> dict[str, Array]:
+        """Return the use of what limits the 3-PPRS alone, (N,) each."""
+        bounds, left, chains = model.robot.bounds, 1 - self.margin, state.links
+        angles = {'rod angle of chain': (1 - np.abs(chains.sin_u)) / (left * (1 - bounds.rod_sine))}
+        if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
+            angles['cosine of rod angle'] = (1 - np.abs(chains.cos_u)) / (
+                left * (1 - bounds.rod_cosine))
+        return {
+            **{f'{name} {k + 1}': share[:, k] for name, share in angles.items() for k in range(3)},
+            'tilt of the platform': state.motion.tilt / (left * self.tilt),
+            'condition number': condition_number(model.robot.geometry, chains.J) / (
+                left * min(bounds.condition_number, self.condition_number))}
+
+    def _room(self, model: DriveModel) -> tuple[Array, Array]:
+        """Return the middle of the drives' motion and the way to either side, (D,) each."""
+        if model.moves_joints:
+            middle, reach = model.robot.structure.room(WIDEST)
+            return middle, reach
+        lower, upper = model.limits.strokes
+        return (lower + upper) / 2, (upper - lower) / 2
 
 
 class NoMotionError(PprsError, ValueError):
@@ -85,7 +189,7 @@ class Motions:
     Parameters
     ----------
     model : DriveModel
-    limits : MotionLimits or ArmLimits
+    limits : MotionLimits
         In addition to those of the model.
     duration : float
         [s]
@@ -99,7 +203,7 @@ class Motions:
     """
 
     model: DriveModel
-    limits: MotionLimits | ArmLimits
+    limits: MotionLimits
     duration: float
     harmonics: Sequence[int] = HARMONICS
     middle: Array = field(init=False)

@@ -16,10 +16,8 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.columns import FittedTerm
-from pprs_dynamics.inference.experiments.criteria import Precision
-from pprs_dynamics.inference.experiments.motion_design import Motions, design
-from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
+from pprs_dynamics.inference.experiments.information import FittedTerm
+from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, design
 from pprs_dynamics.inference.experiments.question import (
     COMMISSION,
     ESTIMATE,
@@ -29,24 +27,19 @@ from pprs_dynamics.inference.experiments.question import (
     precision_of,
     question_of,
 )
-from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 
-ARM_SAMPLES = 150  # of a motion
-ARM_NOISE = 0.01  # of a joint's largest effort, standard deviation where the model knows no other
-ARM_FRICTION = 0.1  # of a joint's largest effort, to which friction and offset are known
 PURPOSES = (SEPARATE, COMMISSION)
 SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
-# Effects of which the same motion with a known mass more shows at once which of them it is: one
-# grows with it, the other stays, or the mass is seen too large.
+# Effects that the same motion with a known mass more separates: one grows with it, the other does
+# not, or the mass appears too large.
 TOLD_BY_LOAD = tuple(map(frozenset, (
     ('coulomb_friction', 'load_friction'), ('coulomb_friction', 'gear_efficiency'),
     ('payload_mass', 'external_wrench'), ('link_mass', 'external_wrench'),
@@ -55,7 +48,6 @@ TOLD_BY_LOAD = tuple(map(frozenset, (
     ('effort_gain', 'drive_inertia'))))
 LOAD_SHARE = 0.1  # of all that moves, that such a mass is about
 RESERVE = 4.0  # standard deviations of noise that efforts are kept below their limits by
-ARM_HARMONICS = 8  # of the duration, of the first motion of an arm
 
 
 class PurposeError(PprsError, ValueError):
@@ -121,8 +113,8 @@ class Experiment:
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     model : DriveModel
     determined : (int, int), optional
-        Of the first motion of an arm: combinations of parameters of links, rotors and friction that
-        it determines better than the description, and all.
+        Of the first motion of a robot: combinations of the numbers of its model and of common
+        effects that it determines better than the size at which they matter, and all.
     """
 
     kind: str
@@ -180,14 +172,12 @@ class Experiment:
     def text(self) -> str:
         """What it is for, and whether it will do, in a few sentences."""
         if self.determined is not None:
-            return (f'A motion of {self.duration:g} s that determines {self.determined[0]} of '
-                    f'{self.determined[1]} parameters of links, rotors and friction better than '
-                    'the URDF. Collisions of links are not checked.')
+            return ('This motion measures the numbers of the model and shows all common effects. '
+                    f'It determines {self.determined[0]} of {self.determined[1]} combinations of '
+                    'them better than the size at which they matter. Collisions are not checked.')
         if self.kind == ESTIMATE:
             return (f'One explanation is left: {", ".join(self.subjects)}. This motion measures '
                     'its parameters best.')
-        if self.kind == COMMISSION:
-            return ('This motion measures the numbers of the model and shows all common effects.')
         found = []
         if self.separates:
             found.append(f'This motion separates {_listed(self.separates)}: evidence of '
@@ -216,17 +206,17 @@ class Experiment:
 
 
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
-    """Return pairs in words, those of one effect together."""
-    return '; '.join(f'{name} from {", ".join(other for one, other in pairs if one == name)}'
-                     for name in dict.fromkeys(one for one, _ in pairs))
+    """Return pairs in words, those of the same first effect together."""
+    others: dict[str, list[str]] = {}
+    for name, other in pairs:
+        others.setdefault(name, []).append(other)
+    return '; '.join(f'{name} from {", ".join(names)}' for name, names in others.items())
 
 
 def next_experiment(
-    model: DriveModel, recordings: Sequence[Recording] = (),
-    purpose: str = 'separate',
-    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
-    noise: float = 0.05, progress: Callable[[float], None] | None = None,
-    decisions: Decisions = DECISIONS,
+    model: DriveModel, recordings: Sequence[Recording] = (), purpose: str = SEPARATE,
+    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float | None = None, progress: Callable[[float], None] | None = None,
 ) -> Experiment:
     """Return the motion that decides most; see `pprs_dynamics.next_experiment`.
 
@@ -242,14 +232,10 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    limits = limits or (ArmLimits() if model.moves_joints else MotionLimits())
+    limits = limits or MotionLimits()
     motions = Motions(model, limits, duration)
-    if purpose == COMMISSION and model.moves_joints:
-        return commission_arm(replace(motions, harmonics=(ARM_HARMONICS,)), seed, report)
-    question = (commissioning(model, recordings, motions, noise, decisions)
-                if purpose == COMMISSION else
-                question_of(model, recordings, motions, lambda share: report(0.2 * share),
-                            decisions))
+    question = (commissioning(model, recordings, motions, noise) if purpose == COMMISSION else
+                question_of(model, recordings, motions, lambda share: report(0.2 * share)))
     motions = replace(motions, limits=replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor)))
     return design_experiment(question, motions, seed, lambda share: report(0.2 + 0.8 * share))
@@ -260,64 +246,20 @@ def design_experiment(question: Question, motions: Motions, seed: int,
     """Return the motion that answers a question best."""
     drawn = motions.drawn(seed)
     if question.contests:
-        question = question.without_hopeless([question.gram(motions, one) for one in drawn])
+        question = question.without_hopeless([question.gram(motions, series) for series in drawn])
     best = design(motions, drawn, lambda series: question.worth(question.gram(motions, series)),
                   seed, progress)
     after = question.known + question.gram(motions, best)
+    determined = None
+    if question.kind == COMMISSION:
+        gains = np.linalg.eigvalsh(question.precision.own(after))
+        determined = int(np.sum(gains > 1)), len(gains)
     return Experiment(
         question.kind, tuple(dict.fromkeys(term.effect.name for terms in question.subjects
                                            for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
-        best.duration, lambda time: motions.sampled(best, time), question.plan.model)
-
-
-class ArmInformation:
-    """Information of motions about an arm's parameters.
-
-    Parameters
-    ----------
-    model : DriveModel
-    limits : ArmLimits
-    """
-
-    def __init__(self, model: DriveModel, limits: Any) -> None:
-        self.model, self.effort = model, limits.efforts(model)
-        bodies = Bodies(model.robot.inertial)
-        origin, step = np.zeros(len(bodies)), 1e-6
-        self.described = bodies.inertial(origin).ravel()
-        self.slopes = np.column_stack([
-            (bodies.inertial(origin + step * unit).ravel() - self.described) / step
-            for unit in np.eye(len(bodies))])
-
-    def of(self, series: JointSeries) -> Array:
-        """Return the squared gain in precision of each combination over the description."""
-        motion = series.motion(np.linspace(0, series.duration, ARM_SAMPLES))
-        count = len(self.effort)
-        rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
-        efforts = np.abs(rows @ self.described).max(axis=0)
-        largest = np.where(np.isfinite(self.effort), self.effort, np.maximum(efforts, 1e-3))
-        # Inertia of the rotor, viscous friction, dry friction and offset, each of its joint alone.
-        each = np.stack((motion.acceleration, motion.velocity, np.tanh(
-            motion.velocity / np.asarray(self.model.reversal.velocity)),
-            np.ones_like(motion.velocity)), axis=2) * ARM_FRICTION * largest[:, None]
-        own = np.einsum('njk,ji->njik', each, np.eye(count)).reshape(ARM_SAMPLES, count, -1)
-        columns = np.concatenate((rows @ self.slopes, own), axis=2) / (ARM_NOISE * largest)[:, None]
-        J = columns.reshape(-1, columns.shape[2])
-        return np.maximum(np.linalg.eigvalsh(J.T @ J), 0.0)
-
-
-def commission_arm(motions: Motions, seed: int,
-                   progress: Callable[[float], None] = lambda share: None) -> Experiment:
-    """Return the motion that determines most about the links, rotors and friction of an arm."""
-    known = ArmInformation(motions.model, motions.limits)
-
-    def worth(series: JointSeries) -> float:
-        return float(np.sum(np.log1p(known.of(series))))
-
-    best = design(motions, motions.drawn(seed), worth, seed, progress)
-    gains = known.of(best)
-    return Experiment(COMMISSION, (), (), (), motions.uses(best), best.duration, best.motion,
-                      motions.model, (int(np.sum(gains > 1)), len(gains)))
+        best.duration, lambda time: motions.sampled(best, time), question.information.model,
+        determined)
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
@@ -325,8 +267,8 @@ def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
     if purpose not in PURPOSES:
         raise PurposeError(f'purpose is {purpose!r}, must be one of {", ".join(PURPOSES)}')
     if purpose == SEPARATE and not recordings:
-        raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
-                           'what is to be told apart; a new robot starts with --purpose '
+        raise PurposeError('purpose separate: no recording is given, must be at least one, as its '
+                           'remaining candidates are separated; for a new robot: --purpose '
                            'commission')
 
 
@@ -344,8 +286,7 @@ def _expected(question: Question, after: Array) -> tuple[ExpectedEvidence, ...]:
         gained = max(contest.misfit(after) - contest.misfit(question.known), 0.0)
         expected = contest.now + gained
         # Twice a log-likelihood ratio scatters by twice the root of its mean.
-        sure = float(ndtr((expected - question.decisions.rival_margin)
-                          / (2 * np.sqrt(gained) + 1e-9)))
+        sure = float(ndtr((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
         found += [ExpectedEvidence(truth, rival, contest.now, expected, sure)
                   for truth, rival in product(contest.truth, contest.rival)]
     return tuple(found)
@@ -355,19 +296,18 @@ def _accuracies(question: Question, after: Array) -> list[Accuracy]:
     """Return how well numbers and effects would be known; of common effects each alone."""
     if question.contests:
         return []
-    plan, model = question.plan, question.plan.model
-    groups: list[tuple[list[tuple[str, str, float]], Precision]] = []
+    information, groups = question.information, list(question.subjects)
+    if question.kind == ESTIMATE:
+        groups = [tuple(term for terms in groups for term in terms)]
+    asked = [([label for term in terms for label in _labels(term, information.model)],
+              precision_of(information, terms)) for terms in groups]
     if question.kind == COMMISSION:
-        numbers = [one.number for one in plan.base if isinstance(one, ModelNumber)]
-        # Their columns are per standard deviation of what is known beforehand.
-        groups.append(([(one.label, one.unit, one.deviation) for one in numbers],
-                       precision_of(plan, (), plan.numbers)))
-    together = ([[term for subject in question.subjects for term in subject]]
-                if question.kind == ESTIMATE else map(list, question.subjects))
-    groups += [([label for term in terms for label in _labels(term, model)],
-                precision_of(plan, terms)) for terms in together]
+        # Columns of the model's numbers are per standard deviation of what is known beforehand.
+        asked.insert(0, ([(column.label, column.unit, column.deviation) for column in (
+            base.number for base in information.base if isinstance(base, ModelNumber))],
+            precision_of(information, (), information.numbers)))
     found = []
-    for labels, precision in groups:
+    for labels, precision in asked:
         before, later = (precision.deviations(gram) / precision.scales
                          for gram in (question.known, after))
         found += [Accuracy(label, unit, scale, scale * float(a), scale * float(b))

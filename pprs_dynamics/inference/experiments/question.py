@@ -12,12 +12,12 @@ from itertools import product
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
-from pprs_dynamics.inference.experiments.criteria import (
+from pprs_dynamics.inference.experiments.information import (
     Contest,
+    FittedTerm,
     Information,
     Precision,
-    Separation,
+    separation,
 )
 from pprs_dynamics.inference.experiments.motion_design import Motions, coarse_time
 from pprs_dynamics.inference.regression.design import Design
@@ -25,13 +25,13 @@ from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.table import ModelTable, Rival, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import BLOCK_DURATION
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
-from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Effects that most machines have, or that are most often entered wrongly.
@@ -40,6 +40,7 @@ COMMON = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_o
           'external_wrench', 'base_tilt', 'tool_drag', 'link_mass', 'joint_friction')
 # How well the numbers of a new robot are known where its file does not say.
 TOLERANCE = 0.1
+NOISE_SHARE = 0.01  # of a drive's largest effort, where nothing is recorded
 NUMBERS = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods',
            'friction.drives.viscous', 'friction.drives.coulomb', 'friction.revolute.viscous',
            'friction.revolute.coulomb', 'friction.spherical.viscous',
@@ -65,7 +66,6 @@ class Question:
         Effects in question.
     noise_floor : float
         Largest root of the mean squared noise of a drive [N].
-    decisions : Decisions
     """
 
     kind: str
@@ -74,56 +74,54 @@ class Question:
     contests: tuple[Contest, ...]
     subjects: tuple[tuple[FittedTerm, ...], ...]
     noise_floor: float
-    decisions: Decisions = DECISIONS
 
     @property
-    def plan(self) -> ColumnPlan:
-        """Columns of the information."""
-        return self.information.plan
+    def precision(self) -> Precision:
+        """How well the effects in question are known, of a new robot with its model's numbers."""
+        terms = [term for subject in self.subjects for term in subject]
+        numbers = self.information.numbers if self.kind == COMMISSION else ()
+        return precision_of(self.information, terms, numbers)
 
     def gram(self, motions: Motions, series: JointSeries) -> Array:
         """Return the information of a motion, (P, P)."""
         time = coarse_time(series)
-        moved = replace(motions, model=self.plan.model).forces(series, time)
-        return self.information.of_motion(self.plan.on_motion(moved, time), series.duration)
+        moved = replace(motions, model=self.information.model).forces(series, time)
+        return self.information.of_motion(self.information.on_motion(moved, time), series.duration)
 
     def worth(self, gram: Array) -> float:
         """Return the value of a motion in addition to what is known."""
-        numbers = self.plan.numbers if self.kind == COMMISSION else ()
-        terms = [term for subject in self.subjects for term in subject]
-        criterion: Separation | Precision = (
-            Separation(self.contests) if self.contests else precision_of(self.plan, terms, numbers))
-        return criterion.value(self.known + gram)
+        total = self.known + gram
+        return (separation(self.contests, total) if self.contests
+                else self.precision.value(total))
 
     def without_hopeless(self, grams: Sequence[Array]) -> Question:
         """Return the question without the contests that none of some motions would decide."""
         hopeful = tuple(contest for contest in self.contests if contest.now + max(
             contest.misfit(self.known + gram) for gram in grams) - contest.misfit(self.known)
-            > self.decisions.rival_margin)
+            > DECISIONS.rival_margin)
         return replace(self, contests=hopeful) if hopeful else self
 
 
-def precision_of(plan: ColumnPlan, terms: Sequence[FittedTerm], numbers: tuple[int, ...] = (),
-                 ) -> Precision:
+def precision_of(information: Information, terms: Sequence[FittedTerm],
+                 numbers: tuple[int, ...] = ()) -> Precision:
     """Return how well the coefficients of terms and numbers of the model are known."""
-    return Precision((*numbers, *plan.places(terms)),
-                     tuple(k for k in range(len(plan.base)) if k not in numbers),
+    return Precision((*numbers, *information.places(terms)),
+                     tuple(k for k in range(len(information.base)) if k not in numbers),
                      np.concatenate([np.ones(len(numbers)), *(term.scales for term in terms)]))
 
 
 def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
-                progress: Callable[[float], None], decisions: Decisions = DECISIONS) -> Question:
+                progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    table = tabulate(model, recordings, decisions, progress)
-    rivals = table.rivals(decisions.rival_margin)
+    table = tabulate(model, recordings, DECISIONS, progress)
+    rivals = table.rivals(DECISIONS.rival_margin)
     if rivals:
         return _separation(table, rivals, motions)
     adopted, fits = table.reported, table.last
     if not adopted.effects:
-        return commissioning(model, recordings, motions, decisions=decisions)
-    subjects = [_terms(adopted, (candidate,)) for candidate in adopted.effects]
-    return _asked(ESTIMATE, fits.design, fits.regression, adopted.fit, motions, (), subjects,
-                  subjects, decisions)
+        return commissioning(model, recordings, motions)
+    return _asked(ESTIMATE, fits.design, fits.regression, adopted.fit, motions,
+                  [_terms(adopted, (candidate,)) for candidate in adopted.effects])
 
 
 def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) -> Question:
@@ -146,20 +144,19 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
-    subjects = [terms[0]]
-    question = _asked(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, (), subjects,
-                      every, fits.decisions)
-    plan, contests = question.plan, []
+    question = _asked(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, terms[:1],
+                      every)
+    information, contests = question.information, []
     for (refitted, true), more in joined.items():
-        free = plan.places((*terms[refitted], *more))
-        certain = plan.force(terms[refitted])
+        free = information.places((*terms[refitted], *more))
+        certain = information.force(terms[refitted])
         certain[list(free)] = 0.0
         rival = chosen[max(refitted, true) - 1]
         sides = ((rival.missing, rival.instead) if true == 0
                  else (rival.instead, rival.missing))
         contests.append(Contest(
-            *sides, plan.force(terms[true]) - certain, (*range(len(plan.base)), *free),
-            rows[refitted].cost - rows[true].cost))
+            *sides, information.force(terms[true]) - certain,
+            (*range(len(information.base)), *free), rows[refitted].cost - rows[true].cost))
     return replace(question, contests=tuple(contests))
 
 
@@ -185,7 +182,7 @@ def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm
 
 
 def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
-                  noise: float = 0.05, decisions: Decisions = DECISIONS) -> Question:
+                  noise: float | None = None) -> Question:
     """Return the question of a robot that nothing, or little, is known of.
 
     It is of the model's own numbers, and of the effects that are common.
@@ -196,13 +193,32 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
     recordings : sequence of Recording
         What is there already; may be none.
     motions : Motions
-    noise : float
-        Standard deviation of means of the effort over 0.01 s [N], where nothing is recorded.
-    decisions : Decisions
+    noise : float, optional
+        Standard deviation of means of the effort over 0.01 s [N, N m], where nothing is recorded;
+        by default a share of each drive's largest effort.
     """
     if not (model.moves_joints or model_numbers(model)):
         model = DriveModel.from_parameters({**model.values, **{
             f'tolerances.{key}': TOLERANCE for key in NUMBERS if np.any(model.values[key])}})
+    subjects = [(term,) for term in _common_terms(model)]
+    if recordings:
+        design = Design.of(model, recordings)
+        regression = Regression(design.residuals, design.base)
+        # What the model does not explain counts as noise as long as nothing else is known.
+        return _asked(COMMISSION, design, regression, regression.fit(()), motions, subjects)
+    series = motions.drawn(0, 1)[0]
+    largest = np.abs(motions.forces(series, coarse_time(series)).total).max(axis=0)
+    levels = np.maximum(NOISE_SHARE * largest, 1e-9) if noise is None else np.full(
+        len(largest), noise)
+    information = _information(model, model, motions, subjects, {
+        d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
+        for d, level in enumerate(levels)})
+    return Question(COMMISSION, information, information.prior(), (), tuple(subjects),
+                    float(levels.max()))
+
+
+def _common_terms(model: DriveModel) -> list[FittedTerm]:
+    """Return the common effects that a model lacks, of the size at which they matter."""
     present = {effect.name for effect in model.effects}
     terms: list[FittedTerm] = []
     for name in COMMON:
@@ -223,35 +239,24 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
             most[place] = max(most.get(place, ()), names, key=len)
         terms += [FittedTerm(effect, None, {}, names, np.array([scale[key] for key in names]))
                   for names in most.values()]
-    subjects = [(term,) for term in terms]
-    if recordings:
-        design = Design.of(model, recordings)
-        regression = Regression(design.residuals, design.base)
-        # What the model does not explain counts as noise as long as nothing else is known.
-        return _asked(COMMISSION, design, regression, regression.fit(()), motions, (), subjects,
-                      subjects, decisions)
-    white = NoiseSpectrum(np.zeros(0), np.array([noise ** 2]), BLOCK_DURATION)
-    information = Information(_plan(model, model, motions, terms),
-                              dict.fromkeys(range(len(model.drives)), white))
-    return Question(COMMISSION, information, information.prior(), (), tuple(subjects), noise,
-                    decisions)
+    return terms
 
 
 def _asked(kind: str, design: Design, regression: Regression, fit: JointFit, motions: Motions,
-           contests: tuple[Contest, ...], subjects: Sequence[tuple[FittedTerm, ...]],
-           every: Sequence[tuple[FittedTerm, ...]], decisions: Decisions) -> Question:
-    """Return a question after recordings, under the noise of a fit."""
-    plan = _plan(design.given, design.model, motions, [term for terms in every for term in terms])
-    noise: Mapping[int, NoiseSpectrum] = regression.noise(fit)
-    information = Information(plan, noise)
+           subjects: Sequence[Sequence[FittedTerm]],
+           every: Sequence[Sequence[FittedTerm]] = ()) -> Question:
+    """Return a question after recordings, under the noise of a fit; `every`: all columns."""
+    information = _information(design.given, design.model, motions, every or subjects,
+                               regression.noise(fit))
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
     return Question(kind, information, information.of_recordings(design, regression, fit),
-                    contests, tuple(subjects), floor, decisions)
+                    (), tuple(map(tuple, subjects)), floor)
 
 
-def _plan(given: DriveModel, model: DriveModel, motions: Motions, terms: Sequence[FittedTerm],
-          ) -> ColumnPlan:
+def _information(given: DriveModel, model: DriveModel, motions: Motions,
+                 subjects: Sequence[Sequence[FittedTerm]], noise: Mapping[int, NoiseSpectrum],
+                 ) -> Information:
     series = motions.drawn(0, 1)[0]
     time = coarse_time(series)
-    return ColumnPlan.of(given, model, replace(motions, model=model).forces(series, time), time,
-                         terms)
+    return Information.of(given, model, replace(motions, model=model).forces(series, time), time,
+                          [term for terms in subjects for term in terms], noise)

@@ -10,14 +10,13 @@ be, and weakly to their description: what the motion does not excite stays as it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import rounded
 from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.residuals.reconstruction import (
@@ -27,16 +26,25 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.alike import alike_joints
-from pprs_dynamics.physics.mechanism.description import PARAMETERS
+from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    from_pseudo_inertia,
+    pseudo_inertia,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import PassiveJoint
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
 
+LEAST_MASS = 1e-3  # [kg]; links without mass are given this, and
+LEAST_RADIUS = 0.02  # [m] this radius: thin rods of a drawing have none across
+ROWS, COLUMNS = np.tril_indices(4)
 # Numbers of a joint beside those of its link, in this order.
-ARMATURE, VISCOUS, COULOMB, OFFSET = range(4)
-OF_JOINT = 4
+ARMATURE, OFFSET = 0, 3
+OWN = ('robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')
+OF_JOINT = len(OWN)
+REVERSAL_VELOCITIES = 'friction.reversal_velocities'
 # A link's pseudo-inertia is known to as much as itself: drawings often have bodies as points or
 # rods, yet not of ten times the mass.
 SPREAD = 1.0
@@ -47,6 +55,51 @@ WIDTHS = np.geomspace(0.1, 10.0, 13)  # times the model's width of reversal, tri
 ROUNDS = 3  # of weights and widths
 DETERMINED = 0.5  # of what was known before, that a determined number may still be uncertain by
 STANDS = 0.05  # share of the samples in which a joint must move for its friction to be fitted
+
+
+class Bodies:
+    """Links as points of a flat space, n times 10 numbers, 0 for the description.
+
+    Parameters
+    ----------
+    described : (n, 10) array
+        Inertial parameters of the description; see `Mechanism`.
+    """
+
+    def __init__(self, described: Array) -> None:
+        self.roots = np.stack([np.linalg.cholesky(_thick(pseudo_inertia(body)))
+                               for body in described])
+
+    def __len__(self) -> int:
+        return PARAMETERS * len(self.roots)
+
+    def inertial(self, point: Array) -> Array:
+        """Return the inertial parameters (n, 10) at a point (10 n,)."""
+        P = self.roots @ self._relative(point) @ self.roots.transpose(0, 2, 1)
+        return np.array([from_pseudo_inertia(body) for body in P])
+
+    def distance(self, point: Array) -> Array:
+        """Return the distance from the description, element by element, (16 n,)."""
+        return (self._relative(point) - np.eye(4)).ravel()
+
+    def _relative(self, point: Array) -> Array:
+        M = np.tile(np.eye(4), (len(self.roots), 1, 1))
+        M[:, ROWS, COLUMNS] += point.reshape(-1, PARAMETERS)
+        return M @ M.transpose(0, 2, 1)
+
+
+def _thick(P: Array) -> Array:
+    """Return a pseudo-inertia of a body with mass and extent."""
+    mass = max(float(P[3, 3]), LEAST_MASS)
+    centre = P[:3, 3] / mass
+    about = P[:3, :3] - mass * np.outer(centre, centre)
+    values, axes = np.linalg.eigh((about + about.T) / 2)
+    values = np.maximum(values, mass * LEAST_RADIUS ** 2)
+    thick = np.empty((4, 4))
+    thick[:3, :3] = axes @ np.diag(values) @ axes.T + mass * np.outer(centre, centre)
+    thick[:3, 3] = thick[3, :3] = mass * centre
+    thick[3, 3] = mass
+    return thick
 
 
 @dataclass(frozen=True)
@@ -111,56 +164,38 @@ def _treated(found: Reconstruction, columns: Callable[[Any], Array]) -> Array:
 
 def own_numbers(model: DriveModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
-    values = model.values
-    return np.column_stack([values[key] for key in (
-        'robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
-
-
-def columns_of(model: DriveModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
-    """Return the columns of recordings."""
-    return [ArmColumns.of_motion(model, reconstruct(model, one)) for one in recordings]
+    return np.column_stack([model.values[key] for key in OWN])
 
 
 @dataclass(frozen=True)
-class ArmFit:
-    """Result of the fit of an arm.
+class FittedNumber:
+    """A number of the model, before and after, with its standard deviation."""
 
-    Parameters
-    ----------
-    model : DriveModel
-    determined, total : int
-        Combinations of the links' inertial parameters that the motion determines, and all.
-    std : dict of str to (n,) array
-        Of armature, viscous and dry friction, offset by key; infinite where not determined.
-    weak_links : tuple of str
-        Joints of whose link the mass stays what the description says.
-    standing : tuple of str
-        Joints that hardly move.
-    """
-
-    model: DriveModel
-    determined: int
-    total: int
-    std: dict[str, Array]
-    weak_links: tuple[str, ...]
-    standing: tuple[str, ...]
+    key: str
+    drive: str
+    before: float
+    after: float
+    std: float
+    unit: str
 
 
-def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
-    """Return the model fitted to recordings.
+Fitted = tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]
+"""The fitted model, its numbers, and what the motion does not determine, as sentences."""
 
-    Parameters
-    ----------
-    model : DriveModel
-        As described; its added effects stay as they are.
-    columns : sequence of ArmColumns
-        Of that model.
+
+def fit_arm(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
+    """Return the model fitted to recordings; its added effects are unchanged.
+
+    Of the numbers those of each joint; infinite deviations where the motion does not determine
+    them, and for widths of reversal.
     """
     count = len(model.drives)
+    columns = [ArmColumns.of_motion(model, reconstruct(model, recording))
+               for recording in recordings]
     bodies = Bodies(model.robot.inertial)
-    known = np.concatenate([np.isfinite(one.measured) for one in columns])
-    inertial = np.concatenate([one.inertial for one in columns])
-    rest = np.concatenate([one.measured - one.rest for one in columns])
+    known = np.isfinite(np.concatenate([part.measured for part in columns]))
+    inertial = np.concatenate([part.inertial for part in columns])
+    rest = np.concatenate([part.measured - part.rest for part in columns])
     width = model.reversal.widths(count).copy()
     start = own_numbers(model)
     own, point = start.copy(), np.zeros(len(bodies))
@@ -169,36 +204,70 @@ def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
         if number > 0:
             width = _widths(columns, rest - inertial @ bodies.inertial(point).ravel(), known, own,
                             width, moving)
-        joints = np.concatenate([one.of_joints(width) for one in columns])
+        joints = np.concatenate([part.of_joints(width) for part in columns])
         point, own, spread = _solved(bodies, inertial, joints, np.where(
             known & moving, rest, np.nan), start, point, own)
     links = len(bodies)
-    ratio = np.linalg.eigvalsh(spread[:links, :links]) / SPREAD ** 2
-    masses = np.sqrt(np.diag(spread)[9:links:PARAMETERS]) / SPREAD
     std = np.sqrt(np.diag(spread)[links:]).reshape(count, OF_JOINT).T
     std[:, ~moving] = np.inf
-    names = np.array(model.drives)
-    return ArmFit(
-        _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
-        links, {'robot.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
-                'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
-        tuple(np.array(model.robot.body_joints)[masses > DETERMINED].tolist()),
-        tuple(names[~moving].tolist()))
+    fitted = _with(model, bodies.inertial(point), own, width)
+    return fitted, _numbers(model, fitted, dict(zip(OWN, std, strict=True))), _notes(
+        model, fitted, spread[:links, :links] / SPREAD ** 2, ~moving)
+
+
+def _numbers(model: DriveModel, fitted: DriveModel, std: Mapping[str, Array],
+             ) -> tuple[FittedNumber, ...]:
+    """Return the fitted numbers of each joint; `std`: their standard deviations, by key."""
+    found = []
+    for key in (*OWN, REVERSAL_VELOCITIES):
+        units = [unit.strip() for unit in model.keys[key].unit.split(',')]
+        for k, drive in enumerate(model.drives):
+            before = model.values[key][k]
+            if key == REVERSAL_VELOCITIES:
+                before = before or model.values['friction.reversal_velocity']
+            found.append(FittedNumber(
+                key, drive, float(before), float(fitted.values[key][k]),
+                float(std[key][k]) if key in std else np.inf,
+                units[0] if model.units[k].turns else units[-1]))
+    return tuple(found)
+
+
+def _notes(model: DriveModel, fitted: DriveModel, links: Array, still: Array) -> tuple[str, ...]:
+    """Return what the motion determines.
+
+    Parameters
+    ----------
+    model, fitted : DriveModel
+    links : (10 n, 10 n) array
+        Covariance of the links' inertial parameters over that before the fit.
+    still : (n,) array
+        Joints that hardly move.
+    """
+    before, after = (float(np.sum(robot.masses)) for robot in (model.robot, fitted.robot))
+    determined = int(np.sum(np.linalg.eigvalsh(links) < DETERMINED ** 2))
+    weak = np.sqrt(np.diag(links)[9::PARAMETERS]) > DETERMINED
+    notes = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
+             f'the motion determines {determined} combinations of the {len(links)} inertial '
+             'parameters of the links; all others stay near those of the URDF']
+    if weak.any():
+        notes.append('it does not determine the masses of the links that '
+                     f'{", ".join(np.array(model.robot.body_joints)[weak])} move one by one')
+    if still.any():
+        notes.append(f'{", ".join(np.array(model.drives)[still])} hardly moves: its friction stays '
+                     'as it was')
+    if model.efforts_in_amperes:
+        notes.append('efforts are currents times robot.gain: a gain that is wrong by 1 % makes all '
+                     'numbers wrong by 1 %')
+    return tuple(notes)
 
 
 def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> DriveModel:
     """Return the model with fitted numbers, rounded as files have them."""
-    def numbers(values: Array) -> tuple[float, ...]:
-        return tuple(rounded(float(value)) for value in values)
-
-    values: dict[str, Any] = {
-        **model.values,
-        **{key: numbers(np.array(found)) for key, found in inertial_values(inertial).items()},
-        'robot.armature': numbers(own[:, ARMATURE]),
-        'friction.viscous': numbers(own[:, VISCOUS]),
-        'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
-        'friction.reversal_velocities': numbers(width)}
-    return DriveModel.from_parameters(values, model.source)
+    found = {**inertial_values(inertial), **dict(zip(OWN, own.T, strict=True)),
+             REVERSAL_VELOCITIES: width}
+    return DriveModel.from_parameters({**model.values, **{
+        key: tuple(rounded(float(value)) for value in np.array(numbers))
+        for key, numbers in found.items()}}, model.source)
 
 
 def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
@@ -209,7 +278,7 @@ def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
     if not model.robot.structure.loops:
         return ()
     others = {name for group in alike_joints(model.robot) for name in group[1:]}
-    return tuple(one for one in model.robot.passive_joints if one.name not in others)
+    return tuple(joint for joint in model.robot.passive_joints if joint.name not in others)
 
 
 def of_passive(model: DriveModel, motion: JointMotion) -> Array:
@@ -360,9 +429,9 @@ def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array
     from scipy.optimize import lsq_linear  # here: commands start without it
 
     tried = [np.clip(width * factor, 1e-6, None) for factor in WIDTHS]
-    turning = [np.concatenate([one.turning(each) for one in columns]) for each in tried]
+    turning = [np.concatenate([part.turning(widths) for part in columns]) for widths in tried]
     found = width.copy()
-    motion = np.concatenate([one.motion for one in columns])
+    motion = np.concatenate([part.motion for part in columns])
     for j in np.flatnonzero(moving):
         at = known[:, j]
         y = rest[at, j] - motion[at, j, 0] * own[j, ARMATURE]

@@ -58,26 +58,29 @@ from pprs_dynamics.inference.residuals.reconstruction import (
     reconstruct,
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
-# The same of what is of one drive's own state.
+# The same of the process over one drive's own state.
 OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
-LEAST_TOLD = 1.0  # coefficients, from which the size of a process is taken
+LEAST_COUNT = 1.0  # determined coefficients, over which the size of a process is taken
 LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
 FINER = 8  # points for each sample of a reference, among which the nearest is looked for
-OCTAVES = 6  # of frequency, in each of which another share of what no process tells comes back
+OCTAVES = 6  # of frequency, in each of which another share of the unexplained error repeats
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_DIRECTIONS = 24  # that become columns of all drives together
+
+Processes = tuple[tuple[Process | Waves, ...], ...]
+"""Of each drive the process over all drives, that over its own state, and its waves."""
 
 
 class ReferenceRunError(PprsError, ValueError):
@@ -86,43 +89,37 @@ class ReferenceRunError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference run, fitted: the numbers of the base and the process, given its errors.
+    """A reference run, fitted: the numbers of the base and the processes, given its errors.
 
     Parameters
     ----------
     model : DriveModel
     recordings : tuple of Recording
-    processes : tuple of Process or Waves
-        That over all drives, then those over the state of each, waves of each.
+    processes : Processes
     size : (D, 3) array
-        Standard deviations of a drive's three [N].
+        Standard deviations of a drive's processes [N].
     repeats : (D,) array
-        Correlation of the process in two runs.
+        Correlation of the processes in two runs.
     base : (N, P) array
         Directions of unit variance of the base's numbers, those determined by the reference first.
-    coefficients, root : (Q,) and (Q, Q) arrays
-        Of determined directions, then of the processes of every drive; of their covariance.
-    told : int
-        How many directions of the base's numbers are determined.
+    determined : int
+        How many of these are determined.
+    root : (Q, Q) array
+        Of the covariance of the coefficients: of determined directions, then of the processes of
+        every drive.
     regression, fit : Regression, JointFit
-    names : tuple of str
-        Of the recordings, as they were given.
-    decisions : Decisions
     """
 
     model: DriveModel
     recordings: tuple[Recording, ...]
-    processes: tuple[Process | Waves, ...]
+    processes: Processes
     size: Array
     repeats: Array
     base: Array
-    coefficients: Array
+    determined: int
     root: Array
-    told: int
     regression: Regression
     fit: JointFit
-    names: tuple[str, ...] = ()
-    decisions: Decisions = DECISIONS
 
     @classmethod
     def of(cls, model: DriveModel, recordings: Sequence[Recording]) -> Reference:
@@ -136,31 +133,32 @@ class Reference:
             As `measure_residuals`.
         """
         found, residuals = _measured(model, recordings)
-        numbers = (np.concatenate([_numbers(model, one) for one in found])
-                   if model.is_mechanism else None)
-        names = tuple(one.name for one in recordings)
+        names = ', '.join(recording.name for recording in recordings)
         if len(residuals) < LEAST_LENGTH:
             raise ReferenceRunError(
-                f'{", ".join(names)}: too short for a reference, {len(residuals)} samples after '
-                f'treatment, must be at least {LEAST_LENGTH}: record a longer run')
-        columns, base, told = _base(model, numbers, residuals)
-        drives = range(len(residuals.drives))
+                f'{names}: too short for a reference, {len(residuals)} samples after treatment, '
+                f'must be at least {LEAST_LENGTH}: record a longer run')
+        columns, base = _base(model, found, residuals)
+        drives, determined = range(len(residuals.drives)), columns.shape[2]
         measured = Regression(residuals).drives
         processes = _processes(residuals, columns, measured, model.gear_ratios)
-        shown = [one.known(*motion_of(residuals), residuals.period) for one in processes]
-        features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
+        features = _features(processes, *motion_of(residuals), residuals.period)
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
-        nothing = np.full(len(features[0]), LEAST_SIZE)
-        size = np.stack([fits[d][0] if d in fits else nothing for d in drives])
-        regression = Regression(residuals, (*_base_columns(columns), *(
+        size = np.stack([fits[d][0] if d in fits else np.full(len(features[d]), LEAST_SIZE)
+                         for d in drives])
+        regression = Regression(residuals, (*_base_columns(columns, drives), *(
             column for d in drives for column in _columns_of(d, features[d], size[d]))))
-        fit = regression.at((), np.stack([one.amplitudes[0] for _, one in fits.values()]))
-        _require_same_robot(model, residuals, columns, fit, ', '.join(names))
+        fit = regression.at((), np.stack([fit.amplitudes[0] for _, fit in fits.values()]))
+        _require_same_robot(model, residuals, columns, fit, names)
         values, axes = np.linalg.eigh(fit.covariance)
-        parts = _parts(residuals)
         return cls(model, tuple(recordings), processes, size,
-                   _repeats(regression, fit, told, parts), base, fit.coefficients,
-                   axes * np.sqrt(np.maximum(values, 0.0)), told, regression, fit, names)
+                   _repeats(regression, fit, determined, _parts(residuals)), base, determined,
+                   axes * np.sqrt(np.maximum(values, 0.0)), regression, fit)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the recordings."""
+        return tuple(recording.name for recording in self.recordings)
 
     @property
     def note(self) -> str:
@@ -181,43 +179,45 @@ class Reference:
 
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
                       ) -> CarriedOver:
-        drives, told = range(len(self.size)), self.told
+        count, determined = len(self.size), self.determined
         q, v = motion_of(residuals)
-        shared, *own = ((known, one.new(q, v, known)) for one, known in (
-            (one, one.known(q, v, residuals.period)) for one in self.processes))
-        numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
-                   @ self.base if self.base.size else np.zeros((len(q), len(drives), 0)))
-        of_base = numbers[..., :told] @ self.coefficients[:told]
-        together, apart, at = [], [], told
-        for d in drives:
-            of_drive = shared, *own[d::len(drives)]
-            known = np.concatenate([one[0] for one in of_drive], axis=1)
-            new = np.concatenate([size * one[1] for size, one in zip(
-                self.size[d], of_drive, strict=True)], axis=1)
-            sizes = _sizes(self.size[d], [one[0] for one in of_drive])
-            place, repeats = slice(at, at := at + len(sizes)), self.repeats[d]
+        known = _features(self.processes, q, v, residuals.period)
+        shared = self.processes[0][0].new(q, v, known[0][0])
+        numbers = (_numbers(self.model, reconstructions) @ self.base if self.base.size
+                   else np.zeros((len(q), count, 0)))
+        of_base = numbers[..., :determined] @ self.fit.coefficients[:determined]
+        together, apart = [], []
+        for d, place in enumerate(self._places(known)):
+            new = [shared, *(process.new(q, v, features) for process, features in zip(
+                self.processes[d][1:], known[d][1:], strict=True))]
+            here, repeats = np.concatenate(known[d], axis=1), self.repeats[d]
             together.append(np.concatenate((
-                numbers[:, d, :told] @ self.root[:told] + repeats * known @ self.root[place],
-                numbers[:, d, told:]), axis=1))
+                numbers[:, d, :determined] @ self.root[:determined]
+                + repeats * here @ self.root[place], numbers[:, d, determined:]), axis=1))
             apart.append(np.concatenate((
-                np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
-
-        left = residuals.measured - of_base - self._repeating(q, v, residuals.period)
+                np.sqrt(1 - repeats ** 2) * _sizes(self.size[d], known[d]) * here,
+                *(size * features for size, features in zip(self.size[d], new, strict=True))),
+                axis=1))
+        rest = residuals.measured - of_base - self._repeating(q, v, residuals.period)
         return CarriedOver(
             of_base, self._repeating,
-            *self._open(replace(residuals, measured=left), together, apart),
-            float(np.mean((shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
+            *self._open(replace(residuals, measured=rest), together, apart),
+            float(np.mean((known[0][0] ** 2).sum(axis=1) > DECISIONS.reference_known)))
+
+    def _places(self, features: Sequence[Sequence[Array]]) -> list[slice]:
+        """Return the places of the coefficients of each drive's processes."""
+        ends = self.determined + np.cumsum(
+            [0, *(sum(part.shape[1] for part in of_drive) for of_drive in features)])
+        return [slice(int(start), int(end)) for start, end in pairwise(ends)]
 
     def _repeating(self, q: Array, v: Array, period: float) -> Array:
-        """Return what repeats in addition to the base, (M, D) [N]; see `Waves.known`."""
-        found, count = np.zeros_like(q), q.shape[1]
+        """Return the forces that repeat beyond those of the base, (M, D) [N]; see `Waves.known`."""
+        found = np.zeros_like(q)
         for rows in (slice(start, start + CHUNK) for start in range(0, len(q), CHUNK)):
-            shared, *own = (one.known(q[rows], v[rows], period) for one in self.processes)
-            at = self.told
-            for d in range(count):
-                known = np.concatenate((shared, *own[d::count]), axis=1)
-                place = slice(at, at := at + known.shape[1])
-                found[rows, d] = self.repeats[d] * (known @ self.coefficients[place])
+            known = _features(self.processes, q[rows], v[rows], period)
+            for d, place in enumerate(self._places(known)):
+                found[rows, d] = self.repeats[d] * (
+                    np.concatenate(known[d], axis=1) @ self.fit.coefficients[place])
         return found
 
     def _open(self, residuals: Residuals, together: Sequence[Array], apart: Sequence[Array],
@@ -250,7 +250,7 @@ class Reference:
         values, axes = np.linalg.eigh(rows @ rows.T)
         axes = axes[:, ::-1][:, :int(np.sum(values > LEAST_OPEN))]
         shared, rest = axes[:, :MOST_DIRECTIONS], axes[:, MOST_DIRECTIONS:]
-        return (tuple(ReferenceDirection({d: one @ axis for d, one in enumerate(together)}, 1.0)
+        return (tuple(ReferenceDirection({d: rows @ axis for d, rows in enumerate(together)}, 1.0)
                       for axis in shared.T),
                 {d: OpenForces(np.concatenate((alone[k], together[d] @ rest), axis=1).T, spectra[k])
                  for k, d in enumerate(regression.drives)})
@@ -273,7 +273,7 @@ class Reference:
         finer, forces = (np.stack([np.interp(within, np.arange(len(path)), row) for row in rows.T],
                                   axis=1) for rows in (path, left))
         away, nearest = cKDTree(finer).query(states.path(residuals))
-        met = away < self.decisions.reference_path * np.sqrt(path.shape[1])
+        met = away < DECISIONS.reference_path * np.sqrt(path.shape[1])
         return np.where(met[:, None], forces[nearest], 0.0)
 
 
@@ -291,7 +291,7 @@ def _in_bands(series: DriveSeries, values: Array) -> list[Array]:
 
 def _sizes(size: Array, features: Sequence[Array]) -> Array:
     """Return the size of each feature of a drive."""
-    return np.repeat(size, [one.shape[1] for one in features])
+    return np.repeat(size, [part.shape[1] for part in features])
 
 
 def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array, fit: JointFit,
@@ -307,40 +307,47 @@ def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array,
             'of this robot on a day on which its model was right')
 
 
-def _base(model: DriveModel, numbers: Array | None, residuals: Residuals,
-          ) -> tuple[Array, Array, int]:
-    """Return columns (M, D, P) of determined directions of the base, all directions, and P."""
-    if numbers is None:
-        return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
+def _base(model: DriveModel, found: Sequence[Reconstruction], residuals: Residuals,
+          ) -> tuple[Array, Array]:
+    """Return columns (M, D, P) of determined directions of the base, and all directions."""
+    if not model.is_mechanism:
+        return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0))
+    numbers = _numbers(model, found)
     prior = base_prior(model, residuals.measured, numbers)
     columns = numbers @ prior
     known = np.isfinite(residuals.error).any(axis=0)
     noise = np.nanmean(residuals.error[:, known] ** 2, axis=0)
     values, axes = np.linalg.eigh(np.einsum(
         'mdp,mdq,d->pq', columns[:, known], columns[:, known], 1 / noise, optimize=True))
-    axes, told = axes[:, ::-1], int(np.sum(values > LEAST_INFORMATION))
-    return columns @ axes[:, :told], prior @ axes, told
+    axes = axes[:, ::-1]
+    return columns @ axes[:, :int(np.sum(values > LEAST_INFORMATION))], prior @ axes
 
 
 def _measured(model: DriveModel, recordings: Sequence[Recording],
               ) -> tuple[list[Reconstruction], Residuals]:
-    found = [reconstruct(model, one) for one in recordings]
-    return found, join_tables(model, [treated_table(model, one) for one in found])
+    found = [reconstruct(model, recording) for recording in recordings]
+    return found, join_tables(model, [treated_table(model, motion) for motion in found])
 
 
-def _numbers(model: DriveModel, found: Reconstruction) -> Array:
-    """Return the columns of a base's numbers on a recording, (M, n, P)."""
-    return ArmColumns.of_motion(model, found).numbers(model)
+def _numbers(model: DriveModel, found: Sequence[Reconstruction]) -> Array:
+    """Return the columns of a base's numbers on recordings, (M, n, P)."""
+    return np.concatenate([ArmColumns.of_motion(model, motion).numbers(model)
+                           for motion in found])
 
 
-def _base_columns(columns: Array, drives: Sequence[int] | None = None) -> list[BaseColumn]:
-    every = range(columns.shape[1]) if drives is None else drives
-    return [BaseColumn({d: columns[:, d, p] for d in every}, 1.0)
+def _features(processes: Processes, q: Array, v: Array, period: float) -> list[list[Array]]:
+    """Return the features of each drive's processes in a motion, (M, k) each."""
+    shared = processes[0][0].known(q, v, period)
+    return [[shared, *(process.known(q, v, period) for process in own)] for _, *own in processes]
+
+
+def _base_columns(columns: Array, drives: Sequence[int]) -> list[BaseColumn]:
+    return [BaseColumn({d: columns[:, d, p] for d in drives}, 1.0)
             for p in range(columns.shape[2])]
 
 
 def _columns_of(d: int, features: Sequence[Array], size: Array) -> list[BaseColumn]:
-    return [BaseColumn({d: column}, float(one) ** -2) for column, one in zip(
+    return [BaseColumn({d: column}, float(deviation) ** -2) for column, deviation in zip(
         np.concatenate(features, axis=1).T, _sizes(size, features), strict=True)]
 
 
@@ -363,20 +370,21 @@ def _sized(residuals: Residuals, columns: Array, d: int, features: Sequence[Arra
     """
     count = columns.shape[2]
     size = np.full(len(features), FIRST_SIZE * np.sqrt(np.nanmean(residuals.error[:, d] ** 2)))
-    edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
+    edges = count + np.cumsum([0, *(part.shape[1] for part in features)])
     regression = Regression(residuals, (*_base_columns(columns, [d]),
                                         *_columns_of(d, features, size)), drives=[d])
     start = None
     for _ in range(ROUNDS):
         fit = regression.fit((), start)
         start = fit.amplitudes
-        # By how many of its coefficients are told: the evidence then stands still.
-        told = 1 - np.diag(fit.covariance) * [one.precision for one in regression.columns]
+        # Over the number of determined coefficients: the evidence is then stationary.
+        determined = 1 - np.diag(fit.covariance) * [
+            column.precision for column in regression.columns]
         size = np.array([max(np.linalg.norm(fit.coefficients[a:b]) / np.sqrt(max(
-            told[a:b].sum(), LEAST_TOLD)), LEAST_SIZE) for a, b in pairwise(edges)])
+            determined[a:b].sum(), LEAST_COUNT)), LEAST_SIZE) for a, b in pairwise(edges)])
         precision = _sizes(size, features) ** -2.0
         regression.columns = (*regression.columns[:count], *(
-            replace(column, precision=float(one)) for column, one in zip(
+            replace(column, precision=float(value)) for column, value in zip(
                 regression.columns[count:], precision, strict=True)))
     return size, fit
 
@@ -389,36 +397,37 @@ def _parts(residuals: Residuals) -> Integers:
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               gears: Sequence[float]) -> tuple[Process | Waves, ...]:
-    """Return the process over all drives, those of each, and waves.
+               gears: Sequence[float]) -> Processes:
+    """Return the process over all drives, and for each drive that of its state, and waves.
 
     Lengths maximise the evidence, of one drive after another with the base alone, then of the
     shared process with these; waves are those of the residual.
     """
     plain, drives = States.of(residuals), range(len(residuals.drives))
 
-    own = [min(
-        (Process.of(residuals, replace(plain, lengths=lengths), d) for lengths in OWN_LENGTHS),
-        key=lambda one, d=d: 0.0 if d not in measured else _sized(  # type: ignore[misc]
-            residuals, columns, d, [one[1]])[1].deviance) for d in drives]
-    shared, fits = min(
-        ((one, {d: _sized(residuals, columns, d, (one[1], own[d][1])) for d in measured})
-         for one in (Process.of(residuals, replace(plain, lengths=lengths))
-                     for lengths in LENGTHS)),
-        key=lambda one: sum(fit.deviance for _, fit in one[1].values()))
-    waves = []
+    def evidence(d: int, features: Sequence[Array]) -> float:
+        """Return the deviance of a drive with processes; 0 for one that was not measured."""
+        return _sized(residuals, columns, d, features)[1].deviance if d in measured else 0.0
+
+    own = [min((Process.of(residuals, replace(plain, lengths=lengths), d)
+                for lengths in OWN_LENGTHS), key=lambda found: evidence(d, found[1:]))
+           for d in drives]
+    shared, features = min(
+        (Process.of(residuals, replace(plain, lengths=lengths)) for lengths in LENGTHS),
+        key=lambda found: sum(evidence(d, (found[1], own[d][1])) for d in drives))
+    found = []
     for d in drives:
-        left = residuals.error[:, d]
-        if d in fits:
-            explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
-            left = left - explained @ fits[d][1].coefficients
-            left = left - np.nanmean(left)
-        waves.append(Waves.of(residuals, d, left, gears[d]))
-    return (shared[0], *(one for one, _ in own), *waves)
+        rest = residuals.error[:, d]
+        if d in measured:
+            fit = _sized(residuals, columns, d, (features, own[d][1]))[1]
+            rest = rest - np.concatenate(
+                (columns[:, d], features, own[d][1]), axis=1) @ fit.coefficients
+            rest = rest - np.nanmean(rest)
+        found.append((shared, own[d][0], Waves.of(residuals, d, rest, gears[d])))
+    return tuple(found)
 
 
-def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers,
-             decisions: Decisions = DECISIONS) -> Array:
+def _repeats(regression: Regression, fit: JointFit, determined: int, parts: Integers) -> Array:
     """Return the correlation of the process in two runs of each drive, (D,).
 
     Each part is predicted from the others. What its errors are from that, beyond noise and what
@@ -447,12 +456,12 @@ def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers,
             left = part[-1] - coefficients[index] @ part[:-1]
             expected = part.shape[1] + np.sum(
                 (covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
-            process = part[told:-1]
-            known[d] += (np.sum(process ** 2 / precision[index[told:], None]),
+            process = part[determined:-1]
+            known[d] += (np.sum(process ** 2 / precision[index[determined:], None]),
                          left @ left - expected)
-    weight = (decisions.run_repeats_spread * 2) ** -2
-    apart = (known[:, 1] + weight * 2 * (1 - decisions.run_repeats)) / (known[:, 0] + weight)
+    weight = (DECISIONS.run_repeats_spread * 2) ** -2
+    apart = (known[:, 1] + weight * 2 * (1 - DECISIONS.run_repeats)) / (known[:, 0] + weight)
     found = np.clip(1 - apart / 2, 0.0, 1.0)
     # Parts of a single run say nothing of another day.
     return found if regression.residuals.record[-1] else np.minimum(
-        found, decisions.one_run_repeats)
+        found, DECISIONS.one_run_repeats)

@@ -59,10 +59,10 @@ def read_reference(model: DriveModel, files: Sequence[RunFile] = (),
     then = values_before_changes(model.values)
     if then != dict(model.values):
         model = replace(DriveModel.from_parameters(then), source=model.source)
-    given = files or [one.path for one in _own(model)]
+    given = files or [file.path for file in _own(model)]
     runs = excerpts_within_memory(model, [
-        one if isinstance(one, Recording) else with_mistakes(
-            model, read_recording(one, model.recorded), refuse=not as_it_is) for one in given])
+        run if isinstance(run, Recording) else with_mistakes(
+            model, read_recording(run, model.recorded), refuse=not as_it_is) for run in given])
     repeat = find_repeat(runs, diagnosed)
     if repeat is not None:
         raise UnreadableFileError(runs[repeat[0]].name, f'{repeat[1]}, but {OTHER}')
@@ -76,13 +76,13 @@ def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
         raise ReferenceRunError(
             f'{name} names no reference run, must be given: --reference FREE_RUN; `pprs fit '
             'FREE_RUN --model … --output base.yaml` writes it into a model file')
-    for one in found:
-        if not one.path.exists():
-            raise UnreadableFileError(one.path, f'the reference that {name} names is not there: '
+    for file in found:
+        if not file.path.exists():
+            raise UnreadableFileError(file.path, f'the reference that {name} names is not there: '
                                       'put it back, or give it with --reference FILE')
-        if fingerprint(one.path) != one.sha256:
+        if fingerprint(file.path) != file.sha256:
             raise UnreadableFileError(
-                one.path, f'it is not what {name} was fitted to (its SHA-256 is another): fit the '
+                file.path, f'it is not what {name} was fitted to (its SHA-256 is another): fit the '
                 'model again, or take it as it is with --reference FILE')
     return found
 

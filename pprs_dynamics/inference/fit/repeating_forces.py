@@ -24,12 +24,13 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 
 Integers = np.typing.NDArray[np.int_]
 
-# States that a process is told by, over all drives and over one, and of a recording beyond them.
+# States on which a process is conditioned, over all drives and over one, and further ones of
+# another recording.
 MOST_STATES, MOST_OWN, MOST_NEW = 100, 40, 50
 LEAST_VARIANCE = 0.05  # of the kernel, that a further state must bring
 SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # Waves of a drive: at most; from and to how many over the whole stroke; and how often the variance
-# of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
+# of the residual sine and cosine explain: by chance one in 25 000 that are tried does.
 MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
 WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
 FEW_WHOLE = 10.0  # waves over the stroke between whole numbers for a turn, for one to be meant
@@ -67,9 +68,9 @@ class States:
     def at(self, q: Array, v: Array, drive: int | None = None) -> Array:
         """Return the states of all drives in a motion (M, D), or of one, (M, k)."""
         position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
-        one = slice(None) if drive is None else [drive]
-        return np.concatenate((position[:, one] / self.lengths[0],
-                               direction[:, one] / self.lengths[1]), axis=1)
+        chosen = slice(None) if drive is None else [drive]
+        return np.concatenate((position[:, chosen] / self.lengths[0],
+                               direction[:, chosen] / self.lengths[1]), axis=1)
 
 
 def motion_of(residuals: Residuals) -> tuple[Array, Array]:

@@ -66,13 +66,11 @@ from pprs_dynamics.physics.effects.drive_effect import (
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.effects_block import effect_uncertainties
 from pprs_dynamics.physics.model.forces import Forces
-from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
-from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
@@ -532,9 +530,9 @@ class Design:
         Of errors of position and its rates, (3, N) each.
         """
         q, q_dot, q_ddot = change
-        friction, v = self.friction(), recording.velocity[:, drive]
+        friction, v = self.model.friction, recording.velocity[:, drive]
         rubbing = np.zeros_like(q)
-        if friction is not None and np.any(q_dot):
+        if np.any(q_dot):
             width = float(self.model.reversal.widths(len(self.drives))[drive])
             turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
             rubbing = (friction.dry(recording.friction_load)[:, drive] * turned
@@ -618,12 +616,6 @@ class Design:
         slopes = self.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
         at = column.effect.shape.index(column.parameter)
         return {d: rows[at] for d, rows in slopes.items()}
-
-    def friction(self) -> ActiveFriction | AxisFriction | None:
-        """Return the friction that the model has in its drives."""
-        frictions = (ActiveFriction, AxisFriction)
-        return next((effect for effect in self.model.effects
-                     if isinstance(effect, frictions)), None)
 
 
 def searched_in_drives(design: Design) -> list[type[DriveEffect]]:

@@ -29,7 +29,7 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect, Structure
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION, Forces
+from pprs_dynamics.physics.model.forces import PASSIVE_FRICTION, Forces
 from pprs_dynamics.physics.model.keys import GAIN
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -189,10 +189,7 @@ class Sensitivities:
 
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
-        friction: Any = next(effect for effect in self.model.effects
-                             if effect.name == ACTIVE_FRICTION)
-        size: Array = friction.dry(state.friction_load)
-        return size
+        return self.model.friction.dry(state.friction_load)
 
     def _of_misreadings(self, state: Any, before: Array) -> tuple[list[Array], list[Array]]:
         """Return the changes per position, and per acceleration, that are measured too much.

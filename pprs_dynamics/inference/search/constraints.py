@@ -38,7 +38,6 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
     VISCOUS,
     AsymmetricFriction,
 )
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
@@ -46,7 +45,6 @@ from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.forces import RIGID_BODY
-from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -242,10 +240,7 @@ def own_total(design: Design, drive: int, of: str) -> float:
     """Return the inertia or friction that the input model has in a drive without its effects."""
     if of == INERTIA:
         return _own_inertia(design, drive)
-    friction = next((effect for effect in design.given.effects
-                     if isinstance(effect, ActiveFriction | AxisFriction)), None)
-    if friction is None:
-        return 0.0
+    friction = design.given.friction
     if of == VISCOUS_FRICTION:
         return float(np.broadcast_to(friction.viscous, len(design.drives))[drive])
     usual = np.zeros(len(design.drives))

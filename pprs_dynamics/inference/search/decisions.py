@@ -67,15 +67,9 @@ class Decisions:
     # Periods of a line within the longest stretch, below which it is a drift. Slow noise has
     # bumps of one or two periods.
     line_periods: float = 3.0
-    # Share by which friction by load may differ from friction that does not follow it, up to
-    # which a warning asks for another load. Dry friction varies by as much along a guide.
-    one_load: float = 0.05
     # Share of the time in stick-slip, from which no other effect is claimed. A fifth of the
     # samples decides about any friction.
     stick_slip: float = 0.2
-    # Share of the samples, the slowest, that a pattern of friction may leave out. Friction turns
-    # over there, in a width that nobody knows.
-    reversal_share: float = 0.12
     # Share of a drive's squared error that a statement of compare must explain. A tenth of the
     # rms; less is no news.
     statement_share: float = 0.01

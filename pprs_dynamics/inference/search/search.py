@@ -104,7 +104,10 @@ class Search:
             self._fit(self._additions(with_patterns))
             if not self.best.cost < before - LEAST_IMPROVEMENT:
                 self._fit(self._replacements(self.best))
-            for fitted in (self.best, *self._inadmissible()):
+            barred = self._inadmissible()
+            for fitted in barred:
+                self._fit(self._replacements(fitted))
+            for fitted in (self.best, *barred):
                 simplified(self.fits, fitted)
             if (not self.best.cost < before - LEAST_IMPROVEMENT
                     or (until_nonlinear and self.best.is_nonlinear)):

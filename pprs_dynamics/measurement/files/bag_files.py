@@ -15,11 +15,7 @@ import numpy as np
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.bag_storage import (
-    Bag,
-    opened_bag,
-    require_rosbags,
-)
+from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
     JointStateBlocks,
@@ -34,13 +30,7 @@ from pprs_dynamics.measurement.files.merged_states import (
     read_channels,
     read_merged,
 )
-from pprs_dynamics.measurement.files.samples import (
-    Defect,
-    Indices,
-    Progress,
-    Samples,
-    whole_epoch,
-)
+from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, Samples, whole_epoch
 from pprs_dynamics.measurement.files.way_out import MOST, missing_names
 from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted

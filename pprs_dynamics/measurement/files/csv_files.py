@@ -44,7 +44,8 @@ LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
 NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
 PREAMBLE = 20  # lines that may stand above a table
-NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text'
+NO_TEXT = ('not a recording, must be a bag (rosbag2, .mcap, .db3, ROS 1) or a table (.csv, '
+           '.parquet, .mat, .npz, .json)')
 CONTROLS = re.compile(rb'[\x00-\x08\x0e-\x1f]')  # in no text
 BEGINNING = 1 << 16  # bytes by which the encoding is recognised
 

@@ -303,7 +303,7 @@ class Judgement:
         used = sum(part.stop - part.start for part in self.segments)
         duration = float(sum(time[part.stop - 1] - time[part.start] for part in self.segments))
         if used < FEW_SAMPLES or duration < SHORT_TIME:
-            self._tell('too_short', 1, f'the segments hold only {counted(used, "sample")} '
+            self._tell('too_short', 1, f'the usable segments have only {counted(used, "sample")} '
                                        f'in {duration:.3g} s')
 
     def _named(self, mask: Mask) -> list[str]:

@@ -20,11 +20,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, meant
-from pprs_dynamics.measurement.files.array_files import (
-    KINDS,
-    ArrayTable,
-    open_arrays,
-)
+from pprs_dynamics.measurement.files.array_files import KINDS, ArrayTable, open_arrays
 from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.measurement.files.merged_states import at_stamps
 from pprs_dynamics.measurement.files.samples import (

@@ -17,7 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.mechanism.places import BodyPlace
+from pprs_dynamics.physics.mechanism.state import BodyPlace
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS

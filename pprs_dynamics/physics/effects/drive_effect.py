@@ -16,8 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, SLIDE
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, SLIDE, MechanismState
 
 ALONE = 'drive'  # name of one whose name does not matter
 

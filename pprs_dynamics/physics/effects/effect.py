@@ -16,8 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.mechanism.places import PLATFORM
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import PLATFORM, MechanismState
 
 
 @dataclass(frozen=True)

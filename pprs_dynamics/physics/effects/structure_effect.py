@@ -11,8 +11,7 @@ from typing import Any, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import MechanismState, StructureLoad
 
 
 class StructureEffect(CatalogueEffect):

@@ -1,71 +1,47 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Kernels compiled by Numba, kept on disk; imported only where something is evaluated."""
+"""Functions compiled by Numba and kept on disk; imported only where something is evaluated.
+
+They are kept in the package's own __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names
+another place. NUMBA_DISABLE_JIT=1 switches compiling off.
+"""
 
 from __future__ import annotations
 
 import dis
 import hashlib
-import math
 from collections.abc import Callable
 from functools import cache
-from itertools import count
 from types import CellType, CodeType, FunctionType
 from typing import Any
 
-from pprs_dynamics.physics.mechanism import arithmetic
+import numba
+
+from pprs_dynamics.physics.mechanism.tree_tables import elements
 
 PACKAGE = 'pprs_dynamics'
-REPLACED: dict[Any, Any] = {
-    arithmetic.sqrt: math.sqrt,
-    arithmetic.tanh: math.tanh,
-    arithmetic.larger: arithmetic.compiled_larger,
-    arithmetic.everywhere: arithmetic.compiled_everywhere,
-    arithmetic.sin: math.sin,
-    arithmetic.cos: math.cos,
-    arithmetic.largest: arithmetic.compiled_largest,
-    arithmetic.solve: arithmetic.compiled_solve,
-    arithmetic.elements: arithmetic.compiled_elements,
-}
-
-
-def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
-    """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
-
-    It takes a kernel and parameters of the form that the kernel takes; the loop takes a row.
-
-    Compiling takes seconds, which pays only where it happens once: in the package's own
-    __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names another one.
-    """
-    try:
-        import numba  # noqa: F401
-    except ImportError:
-        return None
-    try:
-        _compiled_loop(_nothing, ())
-    except RuntimeError:  # no locator available: nowhere to write
-        return None
-    return _compiled_loop
 
 
 @cache
 def compiled_function(function: FunctionType) -> Callable[..., Any]:
     """Return a function compiled for the arguments that it gets, kept on disk."""
-    return _stored(_keyed(_bound(function), function))
+    return _stored(_keyed(_bound(function), _fingerprint(function)))
 
 
 def _stored(function: FunctionType) -> Callable[..., Any]:
-    """Return a function compiled and kept on disk."""
-    import numba
-
+    """Return a function compiled, and kept on disk where that can be written."""
     # It makes no arrays, so that nothing needs to count references to those that it gets.
-    compiled: Callable[..., Any] = numba.njit(
-        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, _nrt=False)(function)
+    options: dict[str, Any] = {'nogil': True, 'error_model': 'numpy', 'no_cfunc_wrapper': True,
+                               '_nrt': False}
+    try:
+        compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no locator available
+        compiled = numba.njit(**options)(function)
     return compiled
 
 
-def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
+def _keyed(function: FunctionType, fingerprint: str) -> FunctionType:
     """Return a function that Numba stores under the code of itself and all that it calls.
 
     Numba looks only at the file of a function to decide whether stored code is up to date. All
@@ -74,26 +50,19 @@ def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
     function = FunctionType(function.__code__.replace(co_filename=__file__),
                             function.__globals__, function.__name__, function.__defaults__,
                             function.__closure__)
-    function.__qualname__ = f'{function.__name__}_{_fingerprint(*sources)}'
+    function.__qualname__ = f'{function.__name__}_{fingerprint}'
     function.__module__ = __name__
     return function
 
 
-def _fingerprint(*sources: Any) -> str:
-    """Return a hash of the code of functions and of all that they call and read.
-
-    Parameters
-    ----------
-    sources : function, type or str
-    """
-    content, waiting = hashlib.sha256(), [*sources]
+def _fingerprint(function: FunctionType) -> str:
+    """Return a hash of the code of a function and of all that it calls and reads."""
+    content = hashlib.sha256()
+    waiting: list[Any] = [function]
     seen: set[Any] = set()
     while waiting:
         source = waiting.pop()
-        source = REPLACED.get(source, source)
-        if isinstance(source, str):
-            content.update(source.encode())
-        elif isinstance(source, FunctionType) and source not in seen:
+        if isinstance(source, FunctionType) and source not in seen:
             seen.add(source)
             # A docstring is a constant, too, but nothing that is compiled depends on it.
             content.update(_code_text(source.__code__, source.__doc__).encode())
@@ -118,47 +87,6 @@ def _code_text(code: CodeType, doc: str | None) -> str:
     return repr((code.co_code, code.co_names, code.co_freevars, constants))
 
 
-def _nothing(p: Any, s: Any) -> bool:
-    return True
-
-
-def _template(row: Any, *tables: Any) -> int:
-    p = read(row)  # type: ignore[name-defined]  # noqa: F821
-    first = -1
-    for s in range(len(tables[0])):
-        if not kernel(p, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
-            first = s
-    return first
-
-
-def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
-    reader = _reader(named)
-    own = {'kernel': _compiled(kernel), 'read': _inlined(reader)}
-    loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
-                        f'{kernel.__module__}_{kernel.__name__}'.replace('.', '_'))
-    return _stored(_keyed(loop, _template, kernel, reader))
-
-
-def _reader(named: tuple[Any, ...]) -> Any:
-    """Return a function that makes named tuples of this form from a row of their numbers."""
-    namespace: dict[str, Any] = {}
-    index = count()
-
-    def expression(value: Any) -> str:
-        if not isinstance(value, tuple):
-            return f'row[{next(index)}]'
-        elements = ''.join(f'{expression(element)}, ' for element in value)
-        if type(value) is tuple:
-            return f'({elements})'
-        namespace[type(value).__name__] = type(value)
-        return f'{type(value).__name__}({elements})'
-
-    # Written out: Numba makes named tuples only where all their elements are.
-    source = f'def read(row):\n    return {expression(named)}'
-    exec(source, namespace)
-    return namespace['read']
-
-
 @cache
 def _compiled(function: FunctionType) -> Any:
     """Return a function of this package, and all that it calls, for Numba."""
@@ -168,9 +96,10 @@ def _compiled(function: FunctionType) -> Any:
 def _bound(function: FunctionType) -> FunctionType:
     """Return a copy of a function whose callees of this package are compiled."""
     def callee(used: Any) -> Any:
+        if used is elements:
+            return _compiled(_unchanged)
         if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
-            used = REPLACED.get(used, used)
-            return _compiled(used) if isinstance(used, FunctionType) else used
+            return _compiled(used)
         return used
 
     namespace = dict(function.__globals__)
@@ -183,10 +112,13 @@ def _bound(function: FunctionType) -> FunctionType:
     return bound
 
 
+def _unchanged(named: Any) -> Any:
+    """Return arrays as they are, of which compiled code reads elements fast enough."""
+    return named
+
+
 def _inlined(function: FunctionType) -> Any:
     """Return a function that Numba inlines where it is called."""
-    import numba
-
     # Else their many results are copied through memory: four times slower. Nobody calls them from
     # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Motion of drives that move what they move by themselves: a single axis, joints of an arm."""
+"""Motions of drives: samples, paths between points, and Fourier series from rest to rest."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from functools import cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,132 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix, checked_times
 from pprs_dynamics.physics.mechanism.pose_spline import spline_through
+
+GRID = 512  # points of a period at which peaks are looked for
+
+
+@cache
+def resting_series(harmonics: tuple[int, ...]) -> Array:
+    """Return a basis of all (a, b) that start and end at rest, each of unit peak, (2 K, p)."""
+    # Here and not above: only designed and played motions need it, commands start sooner.
+    from scipy.linalg import null_space
+
+    k = np.array(harmonics, dtype=float)
+    zero = np.zeros_like(k)
+    conditions = np.stack([np.concatenate(row) for row in (
+        (zero, k / k.max()), ((k / k.max()) ** 2, zero), (zero, (k / k.max()) ** 3))])
+    basis = null_space(conditions)
+    angle = 2 * np.pi * k[:, None] * np.arange(GRID) / GRID
+    waves = np.concatenate((np.cos(angle) - 1, np.sin(angle)))
+    result: Array = basis / np.abs(basis.T @ waves).max(axis=1)
+    return result
+
+
+@dataclass(frozen=True)
+class JointSeries:
+    """One motion of n joints: q = middle + sum a_k (cos k w t - 1) + b_k sin k w t.
+
+    Parameters
+    ----------
+    coefficients : (n, p) array
+        Of the resting series [rad, m].
+    middle : (n,) array
+        Where it starts and ends [rad, m].
+    duration : float
+        [s]
+    harmonics : int
+        Of one over the duration.
+    """
+
+    coefficients: Array
+    middle: Array
+    duration: float
+    harmonics: int
+
+    @staticmethod
+    def size(harmonics: int) -> int:
+        """Return the number p of coefficients per joint."""
+        return int(resting_series(tuple(range(1, harmonics + 1))).shape[1])
+
+    def scaled(self, factor: float) -> JointSeries:
+        """Return the same motion with all excursions times a factor."""
+        return replace(self, coefficients=factor * self.coefficients)
+
+    def motion(self, time: Array) -> JointMotion:
+        """Return the motion at times [s], with exact velocities and accelerations."""
+        K = self.harmonics
+        ab = self.coefficients @ resting_series(tuple(range(1, K + 1))).T
+        a, b = ab[:, :K].T, ab[:, K:].T
+        omega = 2 * np.pi * np.arange(1, K + 1) / self.duration
+        s, c = np.sin(np.outer(time, omega)), np.cos(np.outer(time, omega))
+        w = omega[:, None]
+        return JointMotion(self.middle + (c - 1) @ a + s @ b, c @ (w * b) - s @ (w * a),
+                           -(c @ (w * w * a)) - s @ (w * w * b), time)
+
+
+STOP_POINTS = 10
+
+
+class DrivePath(NamedTuple):
+    """Cubic Hermite interpolation of N points; beyond the last point its velocity continues.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Strictly increasing [s].
+    position, velocity : (N, D) arrays
+        [m, rad], per second.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+
+    def at(self, time: Array) -> JointMotion:
+        """Return the motion at M times [s]; before the first point it is that of the first."""
+        since = time - self.time[0]
+        if len(self.time) == 1:
+            return JointMotion(
+                self.position[0] + np.maximum(since, 0.0)[:, None] * self.velocity[0],
+                np.repeat(self.velocity, len(time), axis=0),
+                np.zeros((len(time), self.position.shape[1])))
+        within = np.clip(time, self.time[0], self.time[-1])
+        left = np.clip(np.searchsorted(self.time, within, 'right') - 1, 0, len(self.time) - 2)
+        h = np.diff(self.time)[left][:, None]
+        x = (within[:, None] - self.time[left][:, None]) / h
+        q0, q1 = self.position[left], self.position[left + 1]
+        v0, v1 = self.velocity[left] * h, self.velocity[left + 1] * h
+        c2, c3 = 3 * (q1 - q0) - 2 * v0 - v1, 2 * (q0 - q1) + v0 + v1
+        beyond = np.maximum(time - self.time[-1], 0.0)[:, None]
+        return JointMotion(
+            q0 + x * (v0 + x * (c2 + x * c3)) + beyond * self.velocity[-1],
+            (v0 + x * (2 * c2 + 3 * x * c3)) / h,
+            np.where(beyond > 0, 0.0, (2 * c2 + 6 * x * c3) / h**2))
+
+    def stop(self, start: float, duration: float) -> JointMotion:
+        """Return a motion that brakes smoothly along the path and ends at rest on it.
+
+        The speed along the path falls as (1 - t / duration)^2.
+
+        Parameters
+        ----------
+        start : float
+            Where on the path the stop begins [s].
+        duration : float
+            Of the stop [s].
+
+        Returns
+        -------
+        JointMotion
+            `STOP_POINTS` samples with their times since the beginning of the stop, the first one
+            later than 0 and the last one at rest.
+        """
+        x = 1 - np.arange(1, STOP_POINTS + 1) / STOP_POINTS
+        path = self.at(start + duration / 3 * (1 - x**3))
+        speed, change = (x**2)[:, None], (-2 * x / duration)[:, None]
+        return JointMotion(
+            path.position, path.velocity * speed,
+            path.acceleration * speed**2 + path.velocity * change, (1 - x) * duration)
 
 
 @dataclass(frozen=True)

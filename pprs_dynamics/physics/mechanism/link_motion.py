@@ -13,14 +13,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame
+from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    OPEN_IN_MOTION,
-    WORST_CONDITION,
-    residual,
-)
-from pprs_dynamics.physics.mechanism.tree_evaluation import samples_last
+from pprs_dynamics.physics.mechanism.tree_equations import OPEN_IN_MOTION, WORST_CONDITION, residual
 from pprs_dynamics.physics.mechanism.tree_tables import (
     CONDITION,
     DETERMINANT,
@@ -103,7 +98,7 @@ class LinkMotion:
         implied = np.arange(len(t.passive), len(t.rows))
         if not len(implied):
             return
-        m = samples_last(self.motion)
+        m = Data(*(np.moveaxis(array, 0, -1) for array in self.motion))  # equations on arrays
         residuals = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
         size = np.abs(residuals) / t.row_unit[implied]
         if np.all(size < OPEN_IN_MOTION):

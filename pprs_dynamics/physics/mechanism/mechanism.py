@@ -23,15 +23,20 @@ from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, i
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.places import MECHANISM, SLIDE, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import (
+    MECHANISM,
+    SLIDE,
+    BodyPlace,
+    MechanismState,
+    PassiveJoint,
+    StructureLoad,
+)
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
-from pprs_dynamics.physics.mechanism.tree_tables import JointFriction, Loads
+from pprs_dynamics.physics.mechanism.tree_tables import RIGID, JointFriction, Loads
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 LEAST_GRAVITY = 1e-9  # [m/s^2] along a slide, below which its share is rounding
@@ -139,7 +144,7 @@ class Mechanism:
         return float(self.masses.sum())
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       ) -> JointFriction:
+                       is_own: bool = False) -> JointFriction:
         """Return friction of joints as `MechanismState.against_friction` takes it.
 
         Parameters
@@ -270,17 +275,20 @@ class Mechanism:
 
     def state(self, motion: JointMotion | PlatformMotion, reversal: Reversal,
               friction: JointFriction = NO_FRICTION, closed: dict[Any, Array] | None = None,
-              ) -> MechanismState:
-        """Return the state for a motion; `closed` as of `ModelState`."""
+              found: InverseDynamicsResult | None = None) -> MechanismState:
+        """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
         closed = {} if closed is None else closed
         start, nearby, pose = None, closed.get(self.structure), None
         if isinstance(motion, PlatformMotion):
             # The assembly is that of the pose, whichever the same drives would find from home.
             pose, nearby = motion, None
             motion, start = self.tool_pose.drives(motion, closed)
-        return MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                              channels=motion.channels, robot=self, reversal=reversal,
-                              start=start, nearby=nearby, friction=friction, motion=pose)
+        state = MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
+                               channels=motion.channels, robot=self, reversal=reversal,
+                               start=start, nearby=nearby, friction=friction, motion=pose)
+        if found is not None:
+            vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
+        return state
 
     def remember(self, state: MechanismState, closed: dict[Any, Array]) -> None:
         """Store the coordinates of the last sample, near which the next loops close."""
@@ -303,6 +311,29 @@ class Mechanism:
         return self.structure.evaluation.inverse_dynamics(
             (state.position, state.velocity, state.acceleration), self.by_joint, self.gravity_row,
             state.friction, None, state.start, state.nearby)
+
+    def friction_parameters(self, joints: JointFriction, drives: Array,
+                            ) -> tuple[JointFriction, Array]:
+        """Return friction of joints and numbers of drives, (OF_DRIVE, D), for `one_pass`."""
+        return joints, drives
+
+    def one_pass(self, motion: JointMotion | PlatformMotion,
+                 parameters: tuple[JointFriction, Array], closed: dict[Any, Array] | None,
+                 ) -> InverseDynamicsResult | None:
+        """Return the efforts for a motion of the drives, friction included.
+
+        None for a motion of the tool, and where a sample is out of reach or singular.
+        """
+        if not isinstance(motion, JointMotion):
+            return None
+        structure, (joints, drives) = self.structure, parameters
+        found = structure.evaluation.inverse_dynamics(
+            (motion.position, motion.velocity, motion.acceleration), self.by_joint,
+            self.gravity_row, joints, drives,
+            nearby=None if closed is None else closed.get(structure))
+        if found is not None and closed is not None and structure.loops and len(motion):
+            closed[structure] = found.q[-1].copy()
+        return found
 
     def friction_load(self, state: MechanismState) -> Array:
         """Return what the drives' gears carry [N m, N], (N, D); 0 if that is not known."""

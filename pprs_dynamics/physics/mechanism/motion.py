@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array, Sample
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate_if_ready
+from pprs_dynamics.physics.mechanism.evaluation import is_ready, run
 from pprs_dynamics.physics.mechanism.motion_checks import (
     UNIT_LENGTH_TOLERANCE,
     checked_matrix,
@@ -24,13 +23,12 @@ from pprs_dynamics.physics.mechanism.motion_checks import (
 )
 from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
+from pprs_dynamics.physics.mechanism.vectors import sqrt
 
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')
 WIDTHS = [3, 4, 3, 3, 3, 3]
 ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
-OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
-_NO_PARAMETERS = KernelParameters(())
 FLOAT = np.dtype(np.float64)
 NO_CHANNELS: Mapping[str, Array] = {}
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
@@ -78,7 +76,7 @@ class PlatformMotion:
         columns = (position, orientation, linear_velocity, angular_velocity, linear_acceleration,
                    angular_acceleration)
         rows = _joined(columns)
-        if rows is None or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, rows) >= 0:
+        if rows is None or not _is_sound(rows):
             rows = _checked(columns)
         self.__dict__['rows'] = rows
         if time is not None:
@@ -205,7 +203,7 @@ class PlatformMotion:
     def from_rows(cls, rows: Array, time: ArrayLike | None = None) -> PlatformMotion:
         """Return the motion in a table such as `rows`, an (N, 19) array of floats."""
         checked = np.array(rows)
-        if not len(rows) or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, checked) >= 0:
+        if not len(rows) or not _is_sound(checked):
             # The constructor raises the specific error.
             P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
             return cls(P, q, v, omega, a, epsilon, time)
@@ -274,17 +272,29 @@ def _joined(columns: Sequence[Any]) -> Array | None:
     return rows if right else None
 
 
-def _motion_kernel(p: tuple[()], s: Sample, rows: Array) -> Any:
-    """Normalise quaternions in place; return whether a sample needs no closer look."""
-    x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
-    length: Any = sqrt(x * x + y * y + z * z + w * w)
-    rows[s, 3], rows[s, 4] = x / length, y / length
-    rows[s, 5], rows[s, 6] = z / length, w / length
-    everything = length
-    for column in OTHERS:
-        everything = everything + rows[s, column]
-    # 0 times infinity or NaN is NaN.
-    return (abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE) & (everything * 0.0 == 0.0)
+def _is_sound(rows: Array) -> bool:
+    """Normalise quaternions in place; return False where `_checked` is to look at the rows.
+
+    Nothing is compiled or loaded for that alone.
+    """
+    return is_ready(_normalise) and bool(run(_normalise, rows))
+
+
+def _normalise(rows: Any) -> bool:
+    for s in range(len(rows)):
+        x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
+        length = sqrt(x * x + y * y + z * z + w * w)
+        rows[s, 3], rows[s, 4] = x / length, y / length
+        rows[s, 5], rows[s, 6] = z / length, w / length
+        everything = length
+        for c in range(3):
+            everything = everything + rows[s, c]
+        for c in range(7, rows.shape[1]):
+            everything = everything + rows[s, c]
+        # 0 times infinity or NaN is NaN.
+        if not (abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE and everything * 0.0 == 0.0):
+            return False
+    return True
 
 
 def _checked(columns: Sequence[ArrayLike]) -> Array:

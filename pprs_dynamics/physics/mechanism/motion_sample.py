@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Array, Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
 
 
@@ -32,12 +32,12 @@ class MotionSample(NamedTuple):
     epsilon: Vector
 
 
-def vector(table: Array, s: Sample, k: int) -> Vector:
+def vector(table: Any, s: int, k: int) -> Vector:
     """Return the vector in columns k to k + 2 of sample s."""
     return Vector(table[s, k], table[s, k + 1], table[s, k + 2])
 
 
-def motion_sample(motion: Any, s: Sample) -> MotionSample:
+def motion_sample(motion: Any, s: int) -> MotionSample:
     """Return sample s of a table of motions: P, quaternion, v, omega, a and epsilon."""
     return MotionSample(
         vector(motion, s, 0),

@@ -11,12 +11,12 @@ a formula; here sgn(v) = tanh(v / v_rev), which is 0 at rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import tanh
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.arithmetic import larger, tanh
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,12 @@ class Reversal:
 
 def smooth_sign(velocity: Any, reversal_velocity: Any) -> Any:
     """Return sgn(v) as tanh(v / v_rev); a width per column of (N, D) velocities is allowed."""
-    return tanh(velocity / reversal_velocity)
+    return np.tanh(velocity / reversal_velocity)
 
 
 def sign_over_speed(speed: Any, reversal_velocity: Any) -> Any:
-    """Return tanh(s / v_rev) / s for s >= 0, with its limit 1 / v_rev at rest."""
+    """Return tanh(s / v_rev) / s for a number s >= 0, with its limit 1 / v_rev at rest."""
     # Below 1e-8 the quotient equals its limit to rounding; dividing there would give 0 / 0.
-    safe = larger(speed, 1e-8 * reversal_velocity)
+    smallest = 1e-8 * reversal_velocity
+    safe = smallest if speed < smallest else speed
     return tanh(safe / reversal_velocity) / safe

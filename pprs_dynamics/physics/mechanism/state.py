@@ -1,25 +1,96 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The state of a robot along a motion, as effects take it, and what it asks its robot for."""
+"""The state of a robot along a motion, as effects take it, and what it asks its robot for.
+
+Places and loads of effects are here as well.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.tree_tables import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.system.parallel import lazy
+
+# Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
+PLATFORM, SLIDE, MECHANISM = 'platform', 'slide', 'mechanism'
+
+
+class PassiveJoint(NamedTuple):
+    """A joint without a drive, or several joints that share their friction.
+
+    Parameters
+    ----------
+    name : str
+    radius : float
+        At which its load rubs [m]; 0 where the model does not say.
+    turns : bool
+        False for a slide.
+    has_position : bool
+        Whether one number says where it is, as of a hinge and not of a ball.
+    """
+
+    name: str
+    radius: float
+    turns: bool = True
+    has_position: bool = True
+
+
+class BodyPlace(NamedTuple):
+    """A link, or several that are alike, that may be heavier than the model says.
+
+    Parameters
+    ----------
+    link : str
+    centre : 3 floats
+        Where a body is unless its parameters say otherwise, in the link's frame [m].
+    mass : float
+        What the link weighs, which nothing can take off it [kg]; inf where that is left open.
+    is_spread : bool
+        Whether what is added is spread as the link's own mass is, so that its mass alone counts.
+    """
+
+    link: str
+    centre: tuple[float, float, float]
+    mass: float
+    is_spread: bool = False
+
+
+class StructureLoad(NamedTuple):
+    """Loads on the mechanism in addition to bodies and gravity.
+
+    Parameters
+    ----------
+    wrench : (N, 6) array
+        Force [N] and moment [N m] that the tool applies at its origin, in `base`.
+    torques : mapping of str to (N,) or (N, 3) array
+        By passive joint, what resists a growing position [N m, N]; a column for each of several
+        joints of one name.
+    """
+
+    wrench: Array
+    torques: Mapping[str, Array] = {}
+
+    def __add__(self, other: StructureLoad) -> StructureLoad:  # type: ignore[override]
+        torques = dict(self.torques)
+        for name, torque in other.torques.items():
+            torques[name] = torques[name] + torque if name in torques else torque
+        return StructureLoad(self.wrench + other.wrench, torques)
+
+    def at(self, samples: Any) -> StructureLoad:
+        """Return the loads at samples that a slice, a mask or indices select."""
+        return StructureLoad(self.wrench[samples], {
+            name: torque[samples] for name, torque in self.torques.items()})
 
 
 class Robot(Protocol):
@@ -84,8 +155,12 @@ class Robot(Protocol):
     def position_step(self) -> float:
         """Step of a drive for derivatives by its position [rad, m]."""
 
-    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal) -> Any:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                       is_own: bool = False) -> Any:
+        """Return friction of joints as `MechanismState.against_friction` takes it.
+
+        `is_own` says that a model file states it for the robot.
+        """
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          closed: dict[Any, Array] | None = None) -> Any:

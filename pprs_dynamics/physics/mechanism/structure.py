@@ -23,8 +23,8 @@ from pprs_dynamics.physics.mechanism.closures import (
     ROWS,
     Closing,
     Mobility,
-    with_actuated_coordinates,
-    with_elimination_order,
+    columns_of,
+    with_determined_coordinates,
 )
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
@@ -69,7 +69,9 @@ class Structure:
     rows : dict of str to int
         Joints by name.
     loops : tuple of Loop
-    tool : str
+    base, tool : str
+    poses : mapping of str to Frame
+        See `build_structure`.
     mobility : Mobility
     size : float
         Mean distance of joints and closures from the base [m].
@@ -87,7 +89,9 @@ class Structure:
     links: dict[str, tuple[int, Frame]]
     rows: dict[str, int]
     loops: tuple[Loop, ...]
+    base: str
     tool: str
+    poses: Mapping[str, Frame]
     mobility: Mobility
     size: float
     locked: dict[str, float]
@@ -323,15 +327,15 @@ class _Builder:
                         signs.append(sign)
             starts.append(len(joints))
         driven = _integers([self.coordinate[self.rows[name]] for name in drives])
-        none = _integers([])
-        return with_actuated_coordinates(Model(
+        none, count = _integers([]), len(self.coordinates)
+        return Model(
             joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
-            passive=none, drives=driven, places=none,
+            passive=none, drives=driven,
+            places=np.column_stack((np.full(count, -1), columns_of(driven, count))),
             closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
                 placed, pairwise(starts), strict=True)]).reshape(-1, 4),
             rows=_integers([(k, row[0], *row[1]) for k, row in rows]).reshape(-1, 6),
             path=_integers([*zip(joints, signs, strict=True)]).reshape(-1, 2),
-            starts=np.zeros((1, 3), dtype=np.int64), swap=none, below=none, right=none,
             frames=_vectors(each for frame, axis in zip(self.place, self.axis, strict=True)
                             for each in (*frame.R, frame.p, axis)),
             ratio=np.array(self.ratio), offset=np.array(self.offset),
@@ -341,7 +345,7 @@ class _Builder:
                                     for each in (*a.R, a.p, *b.R, b.p)),
             row_reals=_vectors((*row[2], size if row[0] == TRANSLATION else 1.0)
                                for _, row in rows),
-            passive_unit=np.zeros(0)), driven, len(self.coordinates))
+            passive_unit=np.zeros(0))
 
     def _on(self, loop: Loop, side: str) -> tuple[int, Frame]:
         link, frame = ((loop.a, loop.frame_a) if side == 'a' else (loop.b, loop.frame_b))
@@ -412,13 +416,13 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     structure = Structure(
         description, t, drives,
         tuple(REVOLUTE if description.joints[name].kind in TURNING else PRISMATIC
-              for name in drives), tuple(build.coordinates), build.links, build.rows, loops, tool,
-        Mobility(none, none, none, q, len(q), 1.0), size, build.stopped,
+              for name in drives), tuple(build.coordinates), build.links, build.rows, loops, base,
+        tool, poses, Mobility(none, none, none, q, len(q), 1.0), size, build.stopped,
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
     units = np.where(build.slides, size, 1.0)
-    return replace(structure, mobility=mobility, tables=with_elimination_order(
+    return replace(structure, mobility=mobility, tables=with_determined_coordinates(
         t, mobility.rows, mobility.passive, units, q))
 
 

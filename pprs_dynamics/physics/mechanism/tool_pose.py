@@ -18,26 +18,25 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.closures import (
-    RANK,
-    ROWS,
-    with_actuated_coordinates,
-    with_elimination_order,
+from pprs_dynamics.physics.mechanism.closures import RANK
+from pprs_dynamics.physics.mechanism.description import (
+    CONTINUOUS,
+    PARAMETERS,
+    PRISMATIC,
+    Frame,
+    Joint,
+    Loop,
 )
-from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.structure import (
-    STRIDE_SLIDE,
-    STRIDE_TURN,
-    Structure,
-    path_to_base,
-)
-from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
+from pprs_dynamics.physics.mechanism.tree_tables import Integers
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them
+AXES = np.eye(3)[[0, 1, 2, 2, 1, 0]]
+POSE = 'tool_pose.'  # what the names of their joints begin with
 # What a robot with less than six drives cannot choose may be off by this much [m, rad]: poses in
 # messages are rounded, and a tool's frame is drawn to no better.
 FOLLOWED = 1e-3
@@ -76,9 +75,11 @@ class ToolPose:
         if not structure.loops or len(self.chosen) < len(t.drives):
             raise ModelError('robot.tool', structure.tool, 'be a link of a robot with loops whose '
                              'pose determines all drives, for a trajectory of its poses')
-        self._tied = replace(
-            structure, tables=_tied_tables(structure, row, frame, self.home, self.chosen),
-            mobility=replace(structure.mobility, home=np.append(home, np.zeros(6))))
+        self._tied = _tied_structure(structure, self.home, self.chosen)
+        places = self._tied.coordinates.index
+        self._own = np.array([places(name) for name in structure.coordinates])
+        self._drives = self._own[t.drives]
+        self._pose = np.array([places(f'{POSE}{name}') for name in COORDINATES])
 
     def drives(self, motion: PlatformMotion, closed: dict[Any, Array] | None = None,
                ) -> tuple[JointMotion, Array]:
@@ -118,15 +119,15 @@ class ToolPose:
             raise WorkspaceError(error.sample, f'{self.structure.tool} cannot be at '
                                  f'{_in_words(motion, error.sample)}',
                                  'must be within reach, on the way from home') from None
-        found, count, drives = tied.motion, len(self.structure.home), self.structure.tables.drives
-        self._require_followed(q, found.q[:, count:])
+        found = tied.motion
+        self._require_followed(q, found.q[:, self._pose])
         if len(motion):
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
-            np.ascontiguousarray(each[:, drives]) for each in (found.q, found.v, found.a))
+            each[:, self._drives].copy() for each in (found.q, found.v, found.a))
         return (JointMotion(position, velocity, acceleration, motion.time,
                             channels=motion.channels),
-                found.q[:, :count])
+                found.q[:, self._own])
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:
         """Return the six coordinates of the motion with their derivatives, (N, 6) each.
@@ -193,43 +194,30 @@ def _independent(rows: Array) -> Integers:
     return np.sort(np.array(chosen, dtype=np.int64))
 
 
-def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chosen: Integers,
-                 ) -> Model:
-    """Return tables with the pose's coordinates, those chosen as drives, tied to the tool.
+def _tied_structure(structure: Structure, home: Frame, chosen: Integers) -> Structure:
+    """Return a structure with a chain of the pose's joints, those chosen as drives, to the tool.
 
     Parameters
     ----------
     structure : Structure
-    row : int
-        Joint that moves the tool.
-    frame, home : Frame
-        The tool's in the joint's, and at home in the base's.
+    home : Frame
+        The tool's in the base.
     chosen : int array
     """
-    t, size, count = structure.tables, structure.size, len(structure.home)
-    first, k = len(t.parent), len(t.loop_a)
-    units = np.where(np.arange(len(COORDINATES)) < SLIDES, size, 1.0)
-    strides = np.where(np.arange(len(COORDINATES)) < SLIDES, STRIDE_SLIDE * size, STRIDE_TURN)
-    left = np.setdiff1d(np.arange(len(COORDINATES)), chosen)
-    axes, turned = np.eye(3)[[0, 1, 2, 2, 1, 0]], np.tile(np.eye(3), (6, 1, 1))
-    origins = np.zeros((6, 3))
-    origins[0], turned[SLIDES] = home.p, home.R
-    way, ties, joints = path_to_base(t.parent, row), ROWS['fixed'], np.arange(first, first + 6)
-    every = np.ones(count)
-    every[t.coordinate[(t.coordinate >= 0) & (t.turns == 0)]] = size
-    along = [*((j, 1) for j in joints[::-1]), *((j, -1) for j in way)]
-    added: dict[str, Any] = {
-        'joints': np.column_stack(([0, *joints[:-1]], [0] * 3 + [1] * 3, count + np.arange(6))),
-        'frames': np.concatenate((turned, origins[:, None], axes[:, None]), axis=1).reshape(-1, 3),
-        'ratio': np.ones(6), 'offset': np.zeros(6),
-        'closures': [(way[0], joints[-1], len(t.path), len(t.path) + len(along))],
-        'closure_frames': [*frame.R, frame.p, *np.eye(3), np.zeros(3)],
-        'rows': [(k, kind, *of) for kind, of, _ in ties], 'path': along,
-        'row_reals': [(*weights, size if kind == TRANSLATION else 1.0)
-                      for kind, _, weights in ties]}
-    tied = with_actuated_coordinates(t._replace(
-        stride=strides[chosen], **{name: np.concatenate((getattr(t, name), values))
-                                   for name, values in added.items()}), count + chosen, count + 6)
-    rows = np.array([*range(len(t.passive)), *range(len(t.rows), len(tied.rows))])
-    return with_elimination_order(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
-                                  np.append(every, units), np.append(structure.home, np.zeros(6)))
+    given, (_, root) = structure.description, structure.links[structure.moved_by[0]]
+    links, joints, parent = dict(given.links), dict(given.joints), structure.moved_by[0]
+    frames = [Frame()] * len(COORDINATES)
+    frames[0], frames[SLIDES] = root.inverse @ Frame(p=home.p), Frame(home.R)
+    for k, (name, axis, frame) in enumerate(zip(COORDINATES, AXES, frames, strict=True)):
+        kind, link = PRISMATIC if k < SLIDES else CONTINUOUS, f'{POSE}{name}'
+        joints[link] = Joint(link, kind, parent, link, frame, axis)
+        links[link], parent = np.zeros(PARAMETERS), link
+    at = {name: float(structure.home[c]) for name, row in structure.rows.items()
+          if joints[name].mimic is None and (c := structure.tables.coordinate[row]) >= 0}
+    tie = Loop(f'{POSE}tie', 'fixed', structure.tool, Frame(), parent, Frame())
+    return build_structure(
+        replace(given, links=links, joints=joints), structure.base, structure.tool,
+        tuple(f'{POSE}{COORDINATES[k]}' for k in chosen), (*structure.loops, tie),
+        at | {f'{POSE}{name}': 0.0 for name in COORDINATES}, structure.poses,
+        {name: position for name, position in structure.locked.items()
+         if joints[name].mimic is None})

@@ -3,8 +3,7 @@
 
 """Equations of a tree of joints with loop closures, over tables, for one sample.
 
-Every statement works on elements: on floats when compiled, and on arrays with one element per
-sample in NumPy, where the samples are the last axis. Row 0 of all tables of joints is the base.
+Every statement works on elements of tables. Row 0 of all tables of joints is the base.
 
 A closure is a joint cut open. Its rows r(q) = 0 hold translations along axes of frame A, and
 angles between axes of A and of B. With passive coordinates p and drives a, J = dr/dq = [J_p J_a]:
@@ -19,18 +18,9 @@ R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 8.
 
 from __future__ import annotations
 
+from math import ceil, cos, sin, tanh
 from typing import Any
 
-from pprs_dynamics.physics.mechanism.arithmetic import (
-    cos,
-    everywhere,
-    larger,
-    largest,
-    sin,
-    solve,
-    sqrt,
-    tanh,
-)
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.tree_tables import (
     A_P,
@@ -40,6 +30,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     AXIS,
     B_P,
     B_R,
+    COEFFICIENT,
     CONDITION,
     COORDINATE,
     COULOMB,
@@ -86,7 +77,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     W,
     Z,
 )
-from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, times
+from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, sqrt, times
 
 CLOSED = 1e-7  # [m, rad] of a row and of the last Newton step, after which the error is its square
 MOST_STEPS = 25  # of Newton
@@ -141,6 +132,54 @@ def turned_back(table: Any, k: int, v: Vector) -> Vector:
     """Return the transpose of the matrix that begins with row k times a vector."""
     x, y, z = vector(table, k), vector(table, k + 1), vector(table, k + 2)
     return plus(plus(times(v.x, x), times(v.y, y)), times(v.z, z))
+
+
+def larger(x: Any, y: Any) -> Any:
+    """Return the larger of two numbers; NaN where x is."""
+    return y if x < y else x
+
+
+def solve(A: Any, B: Any) -> Any:
+    """Solve A X = B in place of B, and return the determinant of A, which is destroyed.
+
+    Elimination with partial pivoting, which passes over the zeros: a leg's rows know its own joints
+    and those of the platform.
+
+    Parameters
+    ----------
+    A : (n, n) array
+    B : (n, K) array
+    """
+    size, columns, determinant = len(A), B.shape[1], 1.0
+    for k in range(size):
+        pivot = k
+        for r in range(k + 1, size):
+            if abs(A[r, k]) > abs(A[pivot, k]):
+                pivot = r
+        if pivot != k:
+            determinant = -determinant
+            for c in range(k, size):
+                A[k, c], A[pivot, c] = A[pivot, c], A[k, c]
+            for c in range(columns):
+                B[k, c], B[pivot, c] = B[pivot, c], B[k, c]
+        determinant *= A[k, k]
+        scale = 1.0 / A[k, k]
+        for r in range(k + 1, size):
+            if A[r, k] != 0.0:
+                share = A[r, k] * scale
+                for c in range(k + 1, size):
+                    A[r, c] -= share * A[k, c]
+                for c in range(columns):
+                    B[r, c] -= share * B[k, c]
+    for k in range(size - 1, -1, -1):
+        for n in range(k + 1, size):
+            if A[k, n] != 0.0:
+                for c in range(columns):
+                    B[k, c] -= A[k, n] * B[n, c]
+        scale = 1.0 / A[k, k]
+        for c in range(columns):
+            B[k, c] *= scale
+    return determinant
 
 
 def update_frame_placements(t: Model, m: Data) -> None:
@@ -249,44 +288,44 @@ def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     bool
         False where the loops do not close on the way.
     """
-    zero, count = 0.0 * goal[0], len(t.passive)
+    count = len(t.passive)
     for c in range(len(m.q)):
-        m.q[c] = start[c] + zero
-    m.solution[OPEN] = m.solution[STEPS] = need = size = zero
+        m.q[c] = start[c]
+    m.solution[OPEN] = m.solution[STEPS] = need = size = 0.0
     for d in range(len(t.drives)):
         m.q[t.drives[d]] = goal[d]
         need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
     if not count:
         return True
-    if not everywhere(need < MOST_STRIDES):
+    if not need < MOST_STRIDES:
         m.solution[OPEN] = need + 1.0
         return False
-    strides = largest(need)
+    strides = max(1, ceil(need))
     for k in range(1, strides + 1):
         for d in range(len(t.drives)):
             c = t.drives[d]
             m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
         for n in range(MOST_STEPS):
-            m.solution[STEPS] = 1.0 + n + zero
+            m.solution[STEPS] = 1.0 + n
             update_frame_placements(t, m)
-            size = zero
+            size = 0.0
             for r in range(count):
                 m.residuals[r, 0] = residual(t, m, r)
                 size = larger(size, abs(m.residuals[r, 0]))
             jacobian(t, m, t.places, m.J, m.by_drives)
-            solve(m.J, m.residuals, t)
-            step = zero
+            solve(m.J, m.residuals)
+            step = 0.0
             for r in range(count):
                 step = larger(step, abs(m.residuals[r, 0]))
-            share = LONGEST_STEP / larger(step, LONGEST_STEP + 0.0 * step)
+            share = LONGEST_STEP / larger(step, LONGEST_STEP)
             for r in range(count):
                 m.q[t.passive[r]] -= share * m.residuals[r, 0]
-            if everywhere(larger(step, size) < CLOSED):
+            if larger(step, size) < CLOSED:
                 break
-        if not everywhere(size < CLOSED):
+        if not size < CLOSED:
             break
     m.solution[OPEN] = size
-    return everywhere(size < CLOSED)
+    return bool(size < CLOSED)
 
 
 def is_near(t: Model, start: Any, goal: Any) -> bool:
@@ -306,11 +345,12 @@ def is_regular_and_closed(t: Model, m: Data, at_home: Any) -> bool:
     at_home : (4,) array
         `m.solution` there.
     """
-    if len(t.passive) and not everywhere((m.solution[DETERMINANT] * at_home[DETERMINANT] > 0.0) & (
-            m.solution[CONDITION] < WORST_CONDITION * at_home[CONDITION])):
+    if len(t.passive) and not (
+            m.solution[DETERMINANT] * at_home[DETERMINANT] > 0.0
+            and m.solution[CONDITION] < WORST_CONDITION * at_home[CONDITION]):
         return False
     for r in range(len(t.passive), len(t.rows)):
-        if not everywhere(abs(residual(t, m, r)) < OPEN_IN_MOTION * t.row_reals[r, UNIT]):
+        if not abs(residual(t, m, r)) < OPEN_IN_MOTION * t.row_reals[r, UNIT]:
             return False
     return True
 
@@ -327,10 +367,9 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
     """
     count, drives = len(t.passive), len(t.drives)
     T, inverse, by_drives, passive = m.drive_to_joint, m.inverse, m.by_drives, t.passive
-    zero = 0.0 * m.q[0]
     for c in range(len(m.v)):
-        m.v[c] = zero
-        m.a[c] = zero
+        m.v[c] = 0.0
+        m.a[c] = 0.0
         for d in range(drives):
             T[c, d] = 0.0
     for d in range(drives):
@@ -338,23 +377,23 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
         m.a[t.drives[d]] = a[d]
         T[t.drives[d], d] = 1.0
     update_frame_placements(t, m)
-    m.solution[DETERMINANT] = m.solution[CONDITION] = zero
+    m.solution[DETERMINANT] = m.solution[CONDITION] = 0.0
     if count:
         jacobian(t, m, t.places, m.J, by_drives)
-        there = zero
+        there = 0.0
         for r in range(count):
-            x = zero
+            x = 0.0
             for c in range(count):
                 x = x + (m.J[r, c] * t.passive_unit[c]) ** 2
                 inverse[r, c] = 1.0 if r == c else 0.0
             for d in range(drives):
                 inverse[r, count + d] = by_drives[r, d]
             there = there + x / t.row_reals[r, UNIT] ** 2
-        m.solution[DETERMINANT] = solve(m.J, inverse, t)
+        m.solution[DETERMINANT] = solve(m.J, inverse)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
-        back = zero
+        back = 0.0
         for c in range(count):
-            x = zero
+            x = 0.0
             for r in range(count):
                 x = x + (inverse[c, r] * t.row_reals[r, UNIT]) ** 2
             back = back + x / t.passive_unit[c] ** 2
@@ -362,7 +401,7 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
                 T[passive[c], d] = -inverse[c, count + d]
         m.solution[CONDITION] = sqrt(there * back)
         for c in range(count):
-            x = zero
+            x = 0.0
             for d in range(drives):
                 x = x + T[passive[c], d] * v[d]
             m.v[passive[c]] = x
@@ -372,7 +411,7 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
         for r in range(count):
             m.residuals[r, 0] = row_acceleration(t, m, r)
         for c in range(count):
-            x = zero
+            x = 0.0
             for r in range(count):
                 x = x + inverse[c, r] * m.residuals[r, 0]
             m.a[passive[c]] = -x
@@ -540,7 +579,7 @@ def project_to_actuators(t: Model, m: Data, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts T' tau for efforts of the tree's coordinates."""
     T, passive, driven = m.drive_to_joint, t.passive, t.drives
     for d in range(len(driven)):
-        x = of_tree[driven[d]] + 0.0
+        x = of_tree[driven[d]]
         for c in range(len(passive)):
             x = x + T[passive[c], d] * of_tree[passive[c]]
         efforts[d] = x
@@ -553,7 +592,7 @@ def constraint_forces(t: Model, m: Data, o: Loads) -> None:
         for c in range(3):
             o.loops[k, c] = 0.0
     for r in range(count):
-        x = 0.0 * m.q[0]
+        x = 0.0
         for c in range(count):
             x = x + inverse[c, r] * o.tau[t.passive[c]]
         kind = FORCE if t.rows[r, KIND] == TRANSLATION else MOMENT
@@ -576,7 +615,8 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     Parameters
     ----------
     drives : (OF_DRIVE, D) array
-        Armature [kg m^2, kg], viscous and Coulomb friction, offset, and width of the sign.
+        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, and width
+        of the sign.
     v, a : (D,) arrays
         Velocities and accelerations of the drives.
     efforts : (EFFORTS, D) array
@@ -584,8 +624,9 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     """
     for d in range(len(v)):
         efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
+        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * abs(efforts[TRANSMITTED, d])
         efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
-                                      + drives[COULOMB, d] * tanh(v[d] / drives[WIDTH, d]))
+                                      + dry * tanh(v[d] / drives[WIDTH, d]))
         efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
                              + efforts[JOINT_EFFORT, d])
 
@@ -595,9 +636,9 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
 
     The moment in a closure acts on both of its links: it is felt in the joints between them.
     """
-    zero, of_tree, links = 0.0 * m.q[0], o.tau_friction, m.links
+    of_tree, links = o.tau_friction, m.links
     for c in range(len(m.q)):
-        of_tree[c] = zero
+        of_tree[c] = 0.0
     for k in range(len(s.joint)):
         j = s.joint[k]
         if j >= 0:

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Evaluation of a mechanism's equations at samples: compiled, on floats, or on arrays.
+"""Evaluation of a mechanism's equations at samples, from each to the next.
 
-One function goes through the samples, from each to the next; it is compiled, or runs uncompiled on
-Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
-home, or from where it is known to be. All end on the branch that home is on.
+All samples are on the branch that home is on.
 """
 
 from __future__ import annotations
@@ -17,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.arithmetic import elements
-from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
+from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
     WARM_STEPS,
     actuator_efforts,
@@ -38,7 +35,6 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     EFFORTS,
     JOINT_EFFORT,
     OF_DRIVE,
-    OPEN,
     STEPS,
     TRANSMITTED,
     WIDTH,
@@ -47,6 +43,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     JointFriction,
     Loads,
     Model,
+    elements,
     length_of,
     packed_tables,
     read_loads,
@@ -71,12 +68,18 @@ class InverseDynamicsResult:
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
         By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
+    motion : three (N, D) arrays
+        Position, velocity and acceleration of the drives.
     """
 
-    __slots__ = ('efforts', 'q')
+    __slots__ = ('efforts', 'motion', 'q')
 
-    def __init__(self, q: Array, efforts: Array) -> None:
-        self.q, self.efforts = q, efforts
+    def __init__(self, q: Array, efforts: Array, motion: tuple[Array, Array, Array]) -> None:
+        self.q, self.efforts, self.motion = q, efforts, motion
+
+    def drive_motion(self) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration of the drives."""
+        return self.motion
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
@@ -187,8 +190,8 @@ class Evaluation:
         ----------
         q, v, a : (N, D) arrays
         start : (N, C) array, optional
-            Closed coordinates from which the samples are walked to, instead of home: the first
-            one where each goes on from the last, each of its own where all are taken at once.
+            Closed coordinates of the samples; the first one is walked to from there, instead of
+            home.
         nearby : (C,) array, optional
             Closed coordinates of another motion: used where the first sample is within a stride
             of them and the loops stay assembled as at home, so that nothing depends on them.
@@ -236,15 +239,8 @@ class Evaluation:
         """
         found = np.zeros((len(rows), len(self.tables.drives)))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        loop = compiled_or_none(_rub, len(rows))
-        if loop is not None:
-            loop(*self.packed, rows, loads.links, loads.loops, np.array(friction[:2]),
-                 np.array(friction[2:]), np.empty(len(self.home)), found)
-            return found
-        m, o = samples_last(self.motion(rows)), samples_last(loads)
-        with np.errstate(all='ignore'):
-            joint_friction(self.tables, m, o._replace(tau_friction=np.empty_like(o.tau_friction)),
-                           friction, found.T)
+        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction[:2]),
+            np.array(friction[2:]), np.empty(len(self.home)), found)
         return found
 
     def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
@@ -268,8 +264,7 @@ class Evaluation:
         Returns
         -------
         InverseDynamicsResult or None
-            None where a sample is out of reach or singular, which `forward_kinematics` says, and
-            of many samples that are not evaluated by compiled code.
+            None where a sample is out of reach or singular, which `forward_kinematics` says.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
@@ -278,7 +273,7 @@ class Evaluation:
             given, start, np.empty((1, self._lengths[0])), MOTION | FORCES, gravity, nearby,
             inertial, np.empty((1, self._lengths[1])), friction,
             self._no_actuators if actuators is None else actuators, closed, efforts)
-        return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
+        return None if failed >= 0 else InverseDynamicsResult(closed, efforts, motion)
 
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
              gravity: Array, nearby: Array | None, inertial: Array | None = None,
@@ -300,43 +295,9 @@ class Evaluation:
         at_home = self.at_home if warm or not stages & KEPT else NOWHERE
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
-        arguments = (
-            *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
-            loads, last[1], last[2], actuators, closed, efforts, stages, warm)
-        are_few = len(closed) <= TREE_FEW
-        loop = compiled_or_none(_evaluate, len(closed) if are_few or stages & KEPT else 0)
-        if loop is not None:
-            return int(loop(*arguments))
-        if are_few:
-            try:
-                return _evaluate(*arguments)
-            except (ZeroDivisionError, OverflowError, ValueError):
-                pass  # arrays answer with infinities instead
-        if not stages & KEPT:
-            return 0  # arrays keep the rows of all samples
-        with np.errstate(all='ignore'):
-            return self._run_on_arrays(given, start, rows, stages, gravity, inertial, loads)
-
-    def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
-                       gravity: Array, inertial: Array, loads: Array) -> int:
-        t = self.tables
-        m, o = samples_last(self.motion(rows)), samples_last(views(Loads, self.sizes, loads))
-        if stages & MOTION:
-            q, v, a = np.moveaxis(given, 1, -1)
-            if not close_loops(t, m, self.home if start is None else start.T, q):
-                size = m.solution[OPEN]
-                return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
-            forward_kinematics(t, m, v, a)
-        if stages & FORCES:
-            inverse_dynamics(t, m, inertial, gravity, o)
-            constraint_forces(t, m, o)
-        return -1
-
-
-def samples_last(arrays: Any) -> Any:
-    """Return views with the samples last, as NumPy takes the equations."""
-    moved = (np.moveaxis(array, 0, -1) for array in arrays)
-    return type(arrays)(*moved) if isinstance(arrays, Data | Loads) else tuple(moved)
+        return int(run(
+            _evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
+            gravity, loads, last[1], last[2], actuators, closed, efforts, stages, warm))
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:

@@ -4,7 +4,7 @@
 """Tables of a tree of joints with closures: what it is, how it moves, and what it transmits.
 
 Row 0 of all tables of joints is the base. Tables are also packed as rows of numbers, because
-compiled code takes few arrays faster than many: shapes are stated once, by names of sizes. Space
+compiled code takes few arrays faster than many: fields are annotated with names of sizes. Space
 for a motion is a row per sample, or one row that every sample uses in turn.
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -116,30 +116,22 @@ class Model(NamedTuple):
         The same for coordinates.
     path : (K, 2) int array
         Joints between closures' two links, and 1 on the side of B, -1 on that of A.
-    starts : (passive + 1, 3) int array
-        Where lists begin in `swap`, `below` and `right`.
-    swap, below, right : int arrays
-        The order in which J_p is eliminated; see `closures`.
     """
 
-    joints: Integers
-    passive: Integers
-    drives: Integers
-    places: Integers
-    closures: Integers
-    rows: Integers
-    path: Integers
-    starts: Integers
-    swap: Integers
-    below: Integers
-    right: Integers
-    frames: Array
-    ratio: Array
-    offset: Array
-    stride: Array
-    closure_frames: Array
-    row_reals: Array
-    passive_unit: Array
+    joints: Annotated[Integers, 'joints', 3]
+    passive: Annotated[Integers, 'passive']
+    drives: Annotated[Integers, 'drives']
+    places: Annotated[Integers, 'coordinates', 2]
+    closures: Annotated[Integers, 'loops', 4]
+    rows: Annotated[Integers, 'rows', 6]
+    path: Annotated[Integers, 'path', 2]
+    frames: Annotated[Array, 'frames', 3]
+    ratio: Annotated[Array, 'joints']
+    offset: Annotated[Array, 'joints']
+    stride: Annotated[Array, 'drives']
+    closure_frames: Annotated[Array, 'closure_frames', 3]
+    row_reals: Annotated[Array, 'rows', 3]
+    passive_unit: Annotated[Array, 'passive']
 
     def __getattr__(self, name: str) -> Any:
         return _read(self, name)
@@ -168,17 +160,17 @@ class Data(NamedTuple):
         Scratch: J_p during its elimination, J_a, and rows.
     """
 
-    q: Any
-    v: Any
-    a: Any
-    links: Any
-    loops: Any
-    drive_to_joint: Any
-    inverse: Any
-    solution: Any
-    J: Any
-    by_drives: Any
-    residuals: Any
+    q: Annotated[Any, 'coordinates']
+    v: Annotated[Any, 'coordinates']
+    a: Annotated[Any, 'coordinates']
+    links: Annotated[Any, 'links', 3]
+    loops: Annotated[Any, 'closure_frames', 3]
+    drive_to_joint: Annotated[Any, 'coordinates', 'drives']
+    inverse: Annotated[Any, 'passive', 'solved']
+    solution: Annotated[Any, 4]
+    J: Annotated[Any, 'passive', 'passive']
+    by_drives: Annotated[Any, 'passive', 'drives']
+    residuals: Annotated[Any, 'passive', 1]
 
     def __getattr__(self, name: str) -> Any:
         return _read(self, name)
@@ -199,11 +191,11 @@ class Loads(NamedTuple):
         Of the drives.
     """
 
-    links: Any
-    loops: Any
-    tau: Any
-    tau_friction: Any
-    efforts: Any
+    links: Annotated[Any, 'forces', 3]
+    loops: Annotated[Any, 'loop_forces', 3]
+    tau: Annotated[Any, 'coordinates']
+    tau_friction: Annotated[Any, 'coordinates']
+    efforts: Annotated[Any, 'drives']
 
     def __getattr__(self, name: str) -> Any:
         return _read(self, name)
@@ -229,40 +221,31 @@ class JointFriction(NamedTuple):
 
 
 # Rows of the parameters of drives, and of the efforts that follow from them.
-ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
+ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
 
 
 # Names of the numbers of rows of the tables, and of the columns of some.
 SIZES = ('frames', 'joints', 'coordinates', 'drives', 'passive', 'loops', 'closure_frames', 'rows',
-         'path', 'starts', 'swap', 'below', 'right', 'links', 'forces', 'loop_forces', 'solved')
+         'path', 'links', 'forces', 'loop_forces', 'solved')
+
+
+@cache
+def _shapes(kind: type) -> dict[str, tuple[str | int, ...]]:
+    """Return the shapes that the fields of tables are annotated with, by name."""
+    return {name: hint.__metadata__
+            for name, hint in get_type_hints(kind, include_extras=True).items()}
 
 
 def _sizes_of(t: Model) -> Integers:
     """Return the numbers that `SIZES` names, of tables."""
-    found = {name: rows for table, shape in SHAPES[Model].items()
+    found = {name: rows for table, shape in _shapes(Model).items()
              for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
     found |= {'links': OF_LINK * len(t.joints), 'forces': OF_FORCES * len(t.joints),
               'loop_forces': OF_FORCES * len(t.closures), 'solved': len(t.passive) + len(t.drives)}
     return np.array([found[name] for name in SIZES], dtype=np.int64)
 
 
-SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
-    Model: {
-        'joints': ('joints', 3), 'passive': ('passive',), 'drives': ('drives',),
-        'places': ('coordinates', 2), 'closures': ('loops', 4), 'rows': ('rows', 6),
-        'path': ('path', 2), 'starts': ('starts', 3), 'swap': ('swap',), 'below': ('below',),
-        'right': ('right',), 'frames': ('frames', 3), 'ratio': ('joints',),
-        'offset': ('joints',), 'stride': ('drives',), 'closure_frames': ('closure_frames', 3),
-        'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
-    Data: {
-        'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
-        'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
-        'inverse': ('passive', 'solved'), 'solution': (4,), 'J': ('passive', 'passive'),
-        'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
-    Loads: {
-        'links': ('forces', 3), 'loops': ('loop_forces', 3), 'tau': ('coordinates',),
-        'tau_friction': ('coordinates',), 'efforts': ('drives',)}}
 FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
 N = TypeVar('N', bound=tuple[Any, ...])
 
@@ -297,7 +280,7 @@ def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
 def _places(kind: type, sizes: tuple[int, ...]) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
     by_name = dict(zip(SIZES, sizes, strict=True))
     found, start = [], 0
-    for shape in SHAPES[kind].values():
+    for shape in _shapes(kind).values():
         numbers = tuple(by_name[n] if isinstance(n, str) else n for n in shape)
         found.append((start, start + math.prod(numbers), numbers))
         start += math.prod(numbers)
@@ -311,18 +294,26 @@ def _reader(kind: type) -> Callable[..., Any]:
     """
     lines = ['def read(sizes, row, more):', '    at = 0', *(
         f'    {name} = sizes[{k}]' for k, name in enumerate(SIZES))]
-    for name, shape in SHAPES[kind].items():
+    for name, shape in _shapes(kind).items():
         if name == FIRST_OF_REALS:
             lines.append('    at = 0')
         source = 'more' if kind is Model and _is_real(name) else 'row'
         count = ' * '.join(map(str, shape))
         reshaped = f'.reshape(({", ".join(map(str, shape))}))' if len(shape) > 1 else ''
         lines += [f'    of_{name} = {source}[at:at + {count}]{reshaped}', f'    at += {count}']
-    lines.append(f'    return Kind({", ".join(f"of_{name}" for name in SHAPES[kind])})')
+    lines.append(f'    return Kind({", ".join(f"of_{name}" for name in _shapes(kind))})')
     namespace: dict[str, Any] = {'Kind': kind, '__name__': __name__}
     exec('\n'.join(lines), namespace)
     read: Callable[..., Any] = namespace['read']
     return read
+
+
+def elements(named: Any) -> Any:
+    """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
+
+    Compiled code takes the arrays unchanged.
+    """
+    return type(named)(*(array.data for array in named))
 
 
 def _is_real(name: str) -> bool:

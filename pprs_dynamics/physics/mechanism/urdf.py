@@ -3,9 +3,8 @@
 
 """Robot descriptions from URDF: links with their inertia, joints with their limits.
 
-Closures are read as `<constraint>`, in the form that is proposed for urdfdom (pull request 264);
-gears from `<transmission>`. What is xacro yet is run through the package of that name, if it is
-installed.
+Gears are read from `<transmission>`. What is xacro yet is run through the package of that name, if
+it is installed.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ from pprs_dynamics.physics.mechanism.description import (
     Description,
     Frame,
     Joint,
-    Loop,
     Mimic,
     Transmission,
     body_at,
@@ -52,10 +50,6 @@ KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
 # What xacro made of a file keeps its comments, with what was commented out.
 COMMENT = re.compile(rb'<!--.*?-->', re.DOTALL)
 XACRO = re.compile(rb'<xacro:|=["\'][^"\']*\$[{(]')
-# Types of <constraint>, as those of joints, and what they are here.
-CLOSURES = {'fixed': 'fixed', 'revolute': 'revolute', 'continuous': 'revolute',
-            'prismatic': 'prismatic', 'cylindrical': 'cylindrical', 'universal': 'universal',
-            'spherical': 'spherical', 'ball': 'spherical'}
 REDUCTIONS = ('mechanicalReduction', 'mechanical_reduction')
 DYNAMICS = ('damping', 'friction')
 ROUNDED = 0.01  # by which moments of inertia may break a rule: files give two digits
@@ -139,13 +133,10 @@ def _described(content: bytes, path: str) -> Description:
         for name in each.joints if each.reduction else ():
             if name in joints and joints[name].kind in TURNING:
                 joints[name] = replace(joints[name], reduction=each.reduction)
-    loops = tuple(_read(path, robot.findall('constraint'), _constraint).values())
-    for loop in loops:
-        for link in (loop.a, loop.b):
-            if link not in links:
-                raise UnreadableFileError(path, f'constraint {loop.name} is on {link}, which is '
-                                          'no link')
-    return Description(path, links, joints, hashlib.sha256(content).hexdigest(), loops,
+    if (loop := robot.find('constraint')) is not None:
+        raise UnreadableFileError(path, f'holds <constraint name="{loop.get("name", "")}">, which '
+                                  'no URDF has: write it under robot.loops of the model file')
+    return Description(path, links, joints, hashlib.sha256(content).hexdigest(),
                        remarks=tuple(_unused(robot, joints, transmissions)),
                        transmissions=transmissions,
                        faults=tuple(_impossible_bodies(links, joints)))
@@ -167,38 +158,6 @@ def _transmission(element: ElementTree.Element) -> Transmission:
                              f'"{reductions[0]}", must be a number other than 0')
     return Transmission(element.get('name', ''), kind, tuple(
         joint.get('name', '') for joint in element.findall('joint')), reduction)
-
-
-def _constraint(element: ElementTree.Element) -> Loop:
-    kind = CLOSURES.get(element.get('type', ''))
-    if kind is None:
-        raise ValueError(f'its type is "{element.get("type", "")}", must be one of '
-                         f'{", ".join(CLOSURES)}')
-    sides = []
-    # Both axes are the joint's own; of a universal joint they are its two.
-    for side, to in (('parent', 0 if kind == 'universal' else 2),
-                     ('child', 1 if kind == 'universal' else 2)):
-        link, origin = element.find(side), element.find(f'{side}_origin')
-        if link is None:
-            raise ValueError(f'it is without <{side} link="...">, must have one')
-        axis = np.array(_numbers(element.find(f'{side}_axis'), 'xyz', '1 0 0'))
-        if not np.linalg.norm(axis) > 0:
-            raise ValueError(f'its <{side}_axis> has no length')
-        placed = Frame.of(_numbers(origin, 'xyz', '0 0 0'), _numbers(origin, 'rpy', '0 0 0'))
-        sides.append((link.get('link', ''), placed @ Frame(_turn_to(to, axis))))
-    (a, frame_a), (b, frame_b) = sides
-    return Loop(element.get('name', ''), kind, a, frame_a, b, frame_b)
-
-
-def _turn_to(number: int, axis: np.ndarray) -> np.ndarray:
-    """Return a rotation that takes an axis of a frame to a direction; the same for the same."""
-    columns = np.zeros((3, 3))
-    columns[:, number] = axis / np.linalg.norm(axis)
-    across = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    columns[:, (number + 1) % 3] = np.cross(columns[:, number], across)
-    columns[:, (number + 1) % 3] /= np.linalg.norm(columns[:, (number + 1) % 3])
-    columns[:, (number + 2) % 3] = np.cross(columns[:, number], columns[:, (number + 1) % 3])
-    return columns
 
 
 def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -> Iterator[str]:

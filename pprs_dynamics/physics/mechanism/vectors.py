@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
@@ -29,6 +30,11 @@ class ChainVector(NamedTuple):
     e: Value
     n: Value
     k: Value
+
+
+def sqrt(x: Any) -> float:
+    """Return the square root of a number, NaN below 0."""
+    return math.sqrt(x) if x >= 0.0 else math.nan
 
 
 def add(a: ChainVector, b: ChainVector) -> ChainVector:

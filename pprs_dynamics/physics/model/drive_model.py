@@ -28,15 +28,13 @@ from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
 from pprs_dynamics.physics.model.keys import (
@@ -50,7 +48,7 @@ from pprs_dynamics.physics.model.keys import (
     title_of,
 )
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.physics.model.one_pass import one_pass_of
+from pprs_dynamics.physics.model.one_pass import OWN, OnePass, one_pass_of
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.platform_block import read_platform
@@ -226,14 +224,14 @@ class DriveModel:
         return BLOCKS_PER_PERIOD if self.is_mechanism else 0.0
 
     @property
-    def friction(self) -> AxisFriction:
-        """The friction of its drives, where no load changes it."""
-        return next(one for one in self.effects if isinstance(one, AxisFriction))
+    def friction(self) -> DriveFriction:
+        """The friction of its drives."""
+        return next(one for one in self.effects if isinstance(one, DriveFriction))
 
     @property
-    def offset(self) -> AxisOffset:
+    def offset(self) -> DriveOffset:
         """The constant efforts of its drives."""
-        return next(one for one in self.effects if isinstance(one, AxisOffset))
+        return next(one for one in self.effects if isinstance(one, DriveOffset))
 
     @property
     def title(self) -> str:
@@ -310,7 +308,8 @@ class DriveModel:
     def _joint_friction(self) -> Any:
         """The model's own friction of joints, which is computed in one pass with the efforts."""
         return next((effect.table(self.robot, self.reversal) for effect in self.effects
-                     if isinstance(effect, ModelJointFriction)), NO_FRICTION)
+                     if isinstance(effect, ModelJointFriction)),
+                    self.robot.friction_table({}, self.reversal))
 
     def at_drives(self, state: MechanismState) -> MechanismState:
         """Return the state in which the links follow drives that move as in another."""
@@ -365,14 +364,13 @@ class DriveModel:
         return None if self.moves_joints else PlatformMotion
 
     @cached_property
-    def _one_pass(self) -> Any:
+    def _one_pass(self) -> OnePass | None:
         return one_pass_of(self.robot, self.effects, self.reversal, self._joint_friction)
 
     @cached_property
     def _added(self) -> tuple[Effect, ...]:
         """Effects that are not part of the one pass."""
-        own = self._one_pass.OWN
-        return tuple(effect for effect in self.effects if not isinstance(effect, own))
+        return tuple(effect for effect in self.effects if not isinstance(effect, OWN))
 
     def _require_motion(self, motion: Any) -> None:
         """Raise MotionError for a motion that this model has no forces for."""

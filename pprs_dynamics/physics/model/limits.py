@@ -15,9 +15,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import LimitError, WorkspaceError
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.physics.mechanism.evaluation import run
 
-_NO_PARAMETERS = KernelParameters(())
 LOWER, UPPER, EFFORT = 0, 1, 2  # rows of the kernel's table
 
 
@@ -76,7 +75,7 @@ class DriveLimits:
         drive_motion : three (N, D) arrays
             Position, velocity and acceleration; all of it C-contiguous.
         """
-        return evaluate(allowed_kernel, _NO_PARAMETERS, forces, *drive_motion, self._table) < 0
+        return bool(run(_are_allowed, forces, *drive_motion, self._table))
 
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, D), outside its stroke."""
@@ -100,16 +99,14 @@ class DriveLimits:
                              self.effort_source)
 
 
-def allowed_kernel(
-    p: tuple[()], s: Any, forces: Any, position: Any, velocity: Any, acceleration: Any, limits: Any,
-) -> Any:
-    """Return whether a sample is allowed by a table of LOWER, UPPER and EFFORT, (3, D)."""
-    # 0 times infinity or NaN is NaN.
-    allowed = 0.0 * forces[s, 0] == 0.0
-    for i in range(limits.shape[1]):
-        force, q = forces[s, i], position[s, i]
-        finite = 0.0 * force + 0.0 * velocity[s, i] + 0.0 * acceleration[s, i] == 0.0
-        within = (q >= limits[LOWER, i]) & (q <= limits[UPPER, i]) & (
-            abs(force) <= limits[EFFORT, i])
-        allowed = allowed & finite & within
-    return allowed
+def _are_allowed(forces: Any, position: Any, velocity: Any, acceleration: Any, limits: Any) -> bool:
+    """Return whether all is finite and within a table of LOWER, UPPER and EFFORT, (3, D)."""
+    for s in range(len(forces)):
+        for i in range(limits.shape[1]):
+            force, q = forces[s, i], position[s, i]
+            # 0 times infinity or NaN is NaN.
+            if not (0.0 * force + 0.0 * velocity[s, i] + 0.0 * acceleration[s, i] == 0.0
+                    and limits[LOWER, i] <= q <= limits[UPPER, i]
+                    and abs(force) <= limits[EFFORT, i]):
+                return False
+    return True

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.model.effects_block import check_tolerances
+from pprs_dynamics.physics.model.effects_block import check_tolerances, check_uncertainties
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     NAMED_BLOCKS,
@@ -21,7 +21,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
 )
 from pprs_dynamics.physics.model.reference_keys import check_reference
-from pprs_dynamics.physics.model.uncertainties import check_uncertainties
 
 
 @contextmanager

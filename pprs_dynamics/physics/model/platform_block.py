@@ -13,17 +13,14 @@ import numpy as np
 from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
-from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.passive_friction import (
-    IndependentChainsFriction,
-    JointCoefficients,
-    PassiveFriction,
-    WholeMechanismFriction,
-)
+from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
+from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, SPHERICAL
 from pprs_dynamics.physics.three_pprs.robot import SingularityBounds, ThreePprs
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
@@ -35,16 +32,23 @@ def read_platform(values: Mapping[str, Any],
     for stroke in dict.fromkeys(STROKES):
         if not values[stroke][0] < values[stroke][1]:
             raise ModelError(stroke, values[stroke], 'be a lower and a higher position [m]')
-    printed = values['equations'] == 'printed'
-    passive = _passive_friction(values, printed)
-    is_independent = isinstance(passive, IndependentChainsFriction)
+    blocks = {joint: {'viscous': values[f'friction.{joint}.viscous'],
+                      'coulomb': values[f'friction.{joint}.coulomb'],
+                      'radius': values[f'friction.{joint}.diameter'] / 2}
+              for joint in (REVOLUTE, SPHERICAL)}
+    is_independent = values['friction.approach'] == 'independent_chains'
+    passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
+               else ModelJointFriction(blocks))
     robot = ThreePprs(
         Geometry(**_group(values, 'geometry.')), Masses(**_group(values, 'masses.')),
         gravity_in_efforts(values, 'gravity'),
-        (values['friction.revolute.diameter'] / 2, values['friction.spherical.diameter'] / 2),
+        (blocks[REVOLUTE]['radius'], blocks[SPHERICAL]['radius']),
         SingularityBounds(values['limits.rod_sine'], values['limits.condition_number'],
-                          values['limits.rod_cosine'] if is_independent else 0.0), printed)
-    return (robot, (ActiveFriction(**_group(values, 'friction.drives.')), passive),
+                          values['limits.rod_cosine'] if is_independent else 0.0),
+        values['equations'] == 'printed')
+    drives = DriveFriction(values['friction.drives.viscous'], 0.0,
+                           values['friction.drives.coulomb'])
+    return (robot, (drives, passive),
             Reversal(_reversal_velocity(values), values['friction.reversal_rate']),
             platform_limits(values))
 
@@ -60,14 +64,6 @@ def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """Return the keys and values right below a prefix."""
     return {name.removeprefix(prefix): value for name, value in values.items()
             if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
-
-
-def _passive_friction(values: Mapping[str, Any], printed: bool) -> PassiveFriction:
-    joints = (JointCoefficients(**_group(values, 'friction.revolute.')),
-              JointCoefficients(**_group(values, 'friction.spherical.')))
-    if values['friction.approach'] == WholeMechanismFriction.approach:
-        return WholeMechanismFriction(*joints, printed)
-    return IndependentChainsFriction(*joints, printed, values['limits.rod_cosine'])
 
 
 def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:

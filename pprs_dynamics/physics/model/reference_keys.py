@@ -15,10 +15,8 @@ from pprs_dynamics.physics.model.keys import ANY, Key
 
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
-DIRECTIONS = 'reference_directions'  # in files of earlier fits; the runs themselves are fitted
 KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
-        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True),
-        DIRECTIONS: Key(DIRECTIONS, 'not used', is_text=True, may_be_empty=True)}
+        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
 
 
 class ReferenceFile(NamedTuple):

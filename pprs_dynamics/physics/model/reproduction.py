@@ -10,21 +10,18 @@ paper's own numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
-from pprs_dynamics.physics.three_pprs.passive_friction import (
-    IndependentChainsFriction,
-    PassiveFriction,
-    WholeMechanismFriction,
-)
+from pprs_dynamics.physics.model.keys import APPROACHES
+from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 # Of the paper's path; fine enough that rms figures no longer change in four digits.
@@ -96,24 +93,24 @@ def reproduce(model: DriveModel) -> Reproduction:
     path = HelicalPath(radius=model.robot.geometry.base_radius)
     time = np.linspace(0.0, path.duration, SAMPLES)
     mechanism = model.mechanism(path.motion(time))
-    active = _effect(model, ActiveFriction).force(mechanism)
-    given = _effect(model, PassiveFriction)
-    approaches: tuple[PassiveFriction, ...] = (
-        WholeMechanismFriction(given.revolute, given.spherical, given.printed),
-        IndependentChainsFriction(given.revolute, given.spherical, given.printed,
-                                  model.values['limits.rod_cosine']))
-    passive = {effect.approach: _where_defined(effect, mechanism) for effect in approaches}
+    active = model.friction.force(mechanism)
+    blocks = next(effect.blocks for effect in model.effects
+                  if isinstance(effect, ModelJointFriction))
+    approaches = (ModelJointFriction(blocks),
+                  IndependentChainsFriction(blocks, model.values['limits.rod_cosine']))
+    passive = {approach: _where_defined(effect, mechanism)
+               for approach, effect in zip(APPROACHES, approaches, strict=True)}
     hard_model = replace(model, reversal=replace(
         model.reversal, velocity=HARD_REVERSAL, rate=HARD_REVERSAL))
     hard = hard_model.mechanism(path.motion(time))
     return Reproduction(
         time, mechanism.rigid_force, active, passive, mechanism.links.rod_angle,
-        tuple(_claims(hard, _effect(model, ActiveFriction), approaches)))
+        tuple(_claims(hard, model.friction, approaches)))
 
 
 def _claims(
-    state: MechanismState, active_friction: ActiveFriction,
-    approaches: tuple[PassiveFriction, ...],
+    state: MechanismState, active_friction: DriveFriction,
+    approaches: tuple[ModelJointFriction, IndependentChainsFriction],
 ) -> list[Claim]:
     Q, active = state.rigid_force, active_friction.force(state)
     first, second = (_where_defined(effect, state) for effect in approaches)
@@ -153,18 +150,17 @@ def _claims(
     ]
 
 
-def _approach_at(effect: PassiveFriction, state: MechanismState, cosine: float) -> float:
-    assert isinstance(effect, IndependentChainsFriction)
-    force = _where_defined(replace(effect, minimum_cosine=cosine), state)
+def _approach_at(effect: IndependentChainsFriction, state: MechanismState, cosine: float) -> float:
+    force = _where_defined(IndependentChainsFriction(effect.blocks, cosine), state)
     return float(np.nanmax(np.abs(force)))
 
 
-def _where_defined(effect: PassiveFriction, state: MechanismState) -> Array:
+def _where_defined(effect: ModelJointFriction, state: MechanismState) -> Array:
     """Return the effect's force, NaN where it refuses."""
     if isinstance(effect, IndependentChainsFriction):
         # Evaluated with the bound lifted, so that refused samples can be blanked one by one.
         with np.errstate(divide='ignore', invalid='ignore'):
-            force = replace(effect, minimum_cosine=0.0).force(state)
+            force = IndependentChainsFriction(effect.blocks, 0.0).force(state)
         return np.where(effect.singular(state)[:, None], np.nan, force)
     return effect.force(state)
 
@@ -172,7 +168,3 @@ def _where_defined(effect: PassiveFriction, state: MechanismState) -> Array:
 def _rms(force: Array) -> Array:
     rms: Array = np.sqrt(np.nanmean(force ** 2, axis=0))
     return rms
-
-
-def _effect(model: DriveModel, kind: Any) -> Any:
-    return next(effect for effect in model.effects if isinstance(effect, kind))

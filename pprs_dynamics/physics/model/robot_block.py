@@ -16,7 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import (
     REVOLUTE,
@@ -61,8 +61,8 @@ def read_mechanism(values: dict[str, Any], folder: Path,
     robot = _with_bodies(structure, values)
     common = values['friction.reversal_velocity']
     width = tuple(own or common for own in values['friction.reversal_velocities'])
-    return (robot, (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
-                    AxisOffset(values['friction.offset']), *passive_friction(structure, values)),
+    return (robot, (DriveFriction(values['friction.viscous'], values['friction.coulomb']),
+                    DriveOffset(values['friction.offset']), *passive_friction(structure, values)),
             Reversal(width, values['friction.reversal_rate'], values['friction.reversal_slide']),
             joint_limits(structure))
 

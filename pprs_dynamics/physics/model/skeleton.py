@@ -13,11 +13,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.vectors import ChainVector
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.tree import structure_of
 
-LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
-SLIDE = 0.06  # length of a slide of the 3-PPRS, over its distance from the base's centre
+LINK, DRIVE = 'link', 'drive'
 JOINED = 1e-6  # of the robot's size: joints closer than that are one point
 
 
@@ -29,7 +28,7 @@ class Line:
     ----------
     start, end : int
         Of the points.
-    kind : {'link', 'drive', 'guide'}
+    kind : {'link', 'drive'}
     drive : int
         That moves along it or turns it, or -1.
     name : str
@@ -69,44 +68,15 @@ class Skeleton:
     @classmethod
     def of(cls, model: DriveModel, motion: PlatformMotion | JointMotion) -> Skeleton:
         """Return the poses of a motion of a model."""
-        if model.robot.structure is None:
-            assert isinstance(motion, PlatformMotion)
-            return _of_platform(model, motion)
-        return _of_links(model, model.mechanism(motion).links)
+        if model.robot.structure is not None:
+            return _of_links(model.mechanism(motion).links)
+        q = model.mechanism(motion).position
+        still = np.zeros_like(q)
+        return _of_links(LinkMotion.of(structure_of(model.robot.geometry), q, still, still))
 
 
-def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
-    geometry, strokes = model.robot.geometry, model.values['limits.slide_stroke']
-    found = model.robot.state(motion, model.reversal).links
-    slide, lift = np.split(found.position, 2, axis=1)
-    R, l = np.full_like(slide, geometry.base_radius), geometry.rod_length  # noqa: E741
-    feet, elbows, tips = (geometry.in_base(ChainVector(*point)) for point in (
-        (R, slide, 0 * lift), (R, slide, lift),
-        (R - l * found.cos_u, slide, lift + l * found.sin_u)))
-    points: list[Array] = []
-    lines: list[Line] = []
-    joints: dict[str, int] = {}
-    labels: dict[str, int] = {}
-    for i in range(3):
-        foot, elbow, tip = feet[:, i], elbows[:, i], tips[:, i]
-        along = np.array([-geometry.sin[i], geometry.cos[i], 0.0])
-        middle = geometry.base_radius * np.array([geometry.cos[i], geometry.sin[i], 0.0])
-        half = SLIDE * geometry.base_radius * along
-        first = len(points)
-        points += [np.broadcast_to(middle + end * along, foot.shape) for end in strokes]
-        points += [foot - half, foot + half, foot, elbow, tip]
-        lines += [Line(first, first + 1, GUIDE, -1, f'guide {i + 1}'),
-                  Line(first + 2, first + 3, DRIVE, i, f'slide_{i + 1}'),
-                  Line(first + 4, first + 5, DRIVE, 3 + i, f'lift_{i + 1}'),
-                  Line(first + 5, first + 6, LINK, -1, f'rod {i + 1}')]
-        joints |= {f'C_{i + 1}': first + 5, f'A_{i + 1}': first + 6}
-        labels[f'chain {i + 1}'] = first + 4
-    return Skeleton(np.stack(points, axis=1), tuple(lines),
-                    tuple(joints[f'A_{i}'] for i in (1, 2, 3)), joints, {}, labels)
-
-
-def _of_links(model: DriveModel, links: LinkMotion) -> Skeleton:
-    s, m = model.robot.structure, links.motion
+def _of_links(links: LinkMotion) -> Skeleton:
+    s, m = links.structure, links.motion
     t, size = s.tables, s.size
     count = len(t.parent)
     points = [*np.moveaxis(m.p, 1, 0), *np.moveaxis(m.pA, 1, 0), *np.moveaxis(m.pB, 1, 0),

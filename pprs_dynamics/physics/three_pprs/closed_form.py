@@ -5,15 +5,22 @@
 
 from __future__ import annotations
 
+from math import tanh
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
+from pprs_dynamics.physics.mechanism.evaluation import reader_of
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample, vector
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.three_pprs.active_friction import drive_friction
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    RIGID,
+    TOTAL,
+    elements,
+)
+from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs.closure import (
     Twist,
     Wrench,
@@ -26,7 +33,16 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     are_within_reach,
     chain_motions,
 )
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    CHAINS,
+    Chain,
+    ChainMasses,
+    GeometryParameters,
+    Joints,
+    PlatformBody,
+    RobotParameters,
+    each_chain,
+)
 from pprs_dynamics.physics.three_pprs.passive_joints import (
     JointResistance,
     friction_forces,
@@ -35,16 +51,16 @@ from pprs_dynamics.physics.three_pprs.passive_joints import (
 )
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 
-# Tables of results, (N, 6) each: forces, of which alone there are tables for long batches; the
-# drives' motion and guide loads; of the chains cosine and sine of u, its rates, k_r and k_s; and
-# the six rows of [J].
-TOTAL, RIGID, ACTIVE, PASSIVE, FORCES = 0, 1, 2, 3, 4
+# Tables of results, (N, 6) each: TOTAL, RIGID, DRIVE_FRICTION and JOINT_EFFORT, of which alone
+# there are tables for long batches; the drives' motion and guide loads; of the chains cosine and
+# sine of u, its rates, k_r and k_s; and the six rows of [J].
+FORCES = 4
 POSITION, VELOCITY, ACCELERATION, GUIDE_LOAD = 4, 5, 6, 7
 ANGLE, RATE, RESISTANCE, JACOBIAN, EVERYTHING = 8, 9, 10, 11, 17
 NO_LOAD = np.zeros((1, 9))
 
 
-class DriveFriction(NamedTuple):
+class DriveParameters(NamedTuple):
     """Friction of one drive: c [N s/m], mu and the reversal velocity [m/s]."""
 
     viscous: Value
@@ -53,10 +69,10 @@ class DriveFriction(NamedTuple):
 
 
 class ForcesParameters(NamedTuple):
-    """Parameters of `forces_kernel`.
+    """Parameters of `forces`.
 
     `printed` is 1 for Eq. (7) to the letter, else 0; `bound` is the square of the condition
-    number allowed, `drives` six of `DriveFriction`.
+    number allowed, `drives` six of `DriveParameters`.
     """
 
     robot: RobotParameters
@@ -65,17 +81,55 @@ class ForcesParameters(NamedTuple):
     minimum_sine: Value
     bound: Value
     joints: Joints
-    drives: tuple[DriveFriction, ...]
+    drives: tuple[DriveParameters, ...]
 
 
-FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES = Joints(1.0, 0.0), (DriveFriction(0.0, 0.0, 1.0),) * 6
+FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES = Joints(1.0, 0.0), (DriveParameters(0.0, 0.0, 1.0),) * 6
 
 
-def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, parts: Any) -> Any:
+class Tables(NamedTuple):
+    """Motions, loads and results of samples; see `forces`."""
+
+    motion: Any
+    load: Any
+    parts: Any
+
+
+_V, _CHAIN, _MASSES = Vector(0.0, 0.0, 0.0), Chain(*(0.0,) * 7), ChainMasses(0.0, 0.0, 0.0)
+read_parameters = reader_of(ForcesParameters(
+    RobotParameters(GeometryParameters(0.0, 0.0, 0.0, (_CHAIN,) * 3),
+                    PlatformBody(0.0, _V, _V, _V), (_MASSES,) * 3, _V),
+    0.0, 0.0, 0.0, 0.0, FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES))
+
+
+def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
     """Fill tables of results from one of motions, and one of loads or a single load for all.
 
-    A load has nine columns: the wrench of the platform, and the moments in the hinges.
+    Parameters
+    ----------
+    parameters : array
+        `row_of` a `ForcesParameters`.
+    motion : (N, 19) array
+        See `PlatformMotion.rows`.
+    load : (N, 9) or (1, 9) array
+        Wrench of the platform, and moments in the hinges.
+    parts : (FORCES or EVERYTHING, N, 6) array
+
+    Returns
+    -------
+    int
+        The first sample out of reach or too near a singularity, or -1.
     """
+    p, t = read_parameters(parameters), elements(Tables(motion, load, parts))
+    first = -1
+    for s in range(len(motion)):
+        if not _is_sound(p, s, t.motion, t.load, t.parts) and first < 0:
+            first = s
+    return first
+
+
+def _is_sound(p: ForcesParameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
+    """Fill in sample s and return whether it is within reach and far from a singularity."""
     m, geometry = motion_sample(motion, s), p.robot.geometry
     rods = chain_motions(geometry, m)
     rows = rows_of_chains(geometry, rods)
@@ -101,7 +155,7 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, pa
             _write_twist(parts, s, i, 1.0, inverse.slides[i])
             _write_twist(parts, s, CHAINS + i, c.sin_u, inverse.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)
-    return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)
+    return are_within_reach(rods, p.minimum_sine) and bound <= p.bound
 
 
 @each_chain
@@ -114,23 +168,23 @@ def _joint_resistances(
 
 
 def _write_forces(
-    drive: int, p: ForcesParameters, parts: Any, s: Sample, rigid_body: Any, velocity: Any,
+    drive: int, p: ForcesParameters, parts: Any, s: int, rigid_body: Any, velocity: Any,
     load: Any, passive: Any,
 ) -> None:
     """Write the parts of a drive's force, and their sum."""
     c, mu, width = p.drives[drive]
-    active = drive_friction(c, mu, velocity, load, smooth_sign(velocity, width))
+    active = c * velocity + mu * load * tanh(velocity / width)                 # Eq. (15), (16)
     parts[TOTAL, s, drive] = rigid_body + active + passive                     # Eq. (14)
-    parts[RIGID, s, drive], parts[ACTIVE, s, drive] = rigid_body, active
-    parts[PASSIVE, s, drive] = passive
+    parts[RIGID, s, drive], parts[DRIVE_FRICTION, s, drive] = rigid_body, active
+    parts[JOINT_EFFORT, s, drive] = passive
 
 
-def _write(parts: Any, row: int, s: Sample, i: int, first: Any, second: Any) -> None:
+def _write(parts: Any, row: int, s: int, i: int, first: Any, second: Any) -> None:
     """Write two numbers of chain i."""
     parts[row, s, i], parts[row, s, CHAINS + i] = first, second
 
 
-def _write_twist(parts: Any, s: Sample, drive: int, A: Any, twist: Twist) -> None:
+def _write_twist(parts: Any, s: int, drive: int, A: Any, twist: Twist) -> None:
     """Write a column of [J] = [B]^-1 [A], Eq. (11)."""
     v, omega = twist.v, twist.omega
     parts[JACOBIAN, s, drive], parts[JACOBIAN + 3, s, drive] = A * v.x, A * omega.x

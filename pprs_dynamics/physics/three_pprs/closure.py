@@ -30,9 +30,12 @@ from pprs_dynamics.physics.mechanism.vectors import (
     product,
     times,
 )
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import rod_direction
-from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    CHAINS,
+    GeometryParameters,
+    each_chain,
+)
 
 
 class Wrench(NamedTuple):

@@ -13,7 +13,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
 
 ELBOWS = ('up', 'down')
@@ -66,10 +65,6 @@ class Geometry:
     def sin(self) -> Array:
         """Sines of the chain angles, (3,)."""
         return np.sin(self.chain_angles)
-
-    def in_base(self, vector: ChainVector) -> Array:
-        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
-        return np.stack(in_base(self, vector), axis=-1)
 
     @cached_property
     def kernel_parameters(self) -> GeometryParameters:

@@ -12,15 +12,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.motion_sample import (
-    MotionSample,
-    Rotation,
-    turned,
-)
-from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
+from pprs_dynamics.physics.mechanism.motion_sample import MotionSample, Rotation, turned
+from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain, sqrt
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters, each_chain
 
 
 class ChainSample(NamedTuple):
@@ -92,7 +86,5 @@ def chain_motions(i: int, geometry: GeometryParameters, motion: MotionSample) ->
 
 def are_within_reach(rods: ThreeChains, minimum_sine: Any) -> Any:
     """Return whether all rods reach and none is too nearly horizontal; false for NaN."""
-    within = abs(rods[0].sin_u) >= minimum_sine
-    for i in range(1, CHAINS):
-        within = within & (abs(rods[i].sin_u) >= minimum_sine)
-    return within
+    return (abs(rods[0].sin_u) >= minimum_sine and abs(rods[1].sin_u) >= minimum_sine
+            and abs(rods[2].sin_u) >= minimum_sine)

@@ -8,18 +8,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
-from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base, plus, times
-from pprs_dynamics.physics.three_pprs.chains import each_chain
-from pprs_dynamics.physics.three_pprs.closure import (
-    DriveValues,
-    Wrench,
-    power,
-    rod_row,
-)
+from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base, plus, sqrt, times
+from pprs_dynamics.physics.three_pprs.closure import DriveValues, Wrench, power, rod_row
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains
-from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters, Joints
+from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    GeometryParameters,
+    Joints,
+    each_chain,
+)
 
 
 class Turnover(NamedTuple):

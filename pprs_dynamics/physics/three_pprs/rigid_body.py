@@ -13,12 +13,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
-from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.motion_sample import (
-    MotionSample,
-    turned,
-    turned_back,
-)
+from pprs_dynamics.physics.mechanism.motion_sample import MotionSample, turned, turned_back
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -26,24 +21,17 @@ from pprs_dynamics.physics.mechanism.vectors import (
     minus,
     plus,
     product,
+    sqrt,
     times,
 )
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
-from pprs_dynamics.physics.three_pprs.closure import (
-    DriveValues,
-    Wrench,
-    power,
-    unit_wrench,
-)
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
-    ChainSample,
-    ThreeChains,
-    rod_normal,
-)
+from pprs_dynamics.physics.three_pprs.closure import DriveValues, Wrench, power, unit_wrench
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainSample, ThreeChains, rod_normal
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    CHAINS,
     ChainMasses,
     PlatformBody,
     RobotParameters,
+    each_chain,
 )
 
 

@@ -17,24 +17,30 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
-from pprs_dynamics.errors import (
-    ConvergenceError,
-    ModelError,
-    SingularityError,
-    WorkspaceError,
-)
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.errors import ConvergenceError, ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism.evaluation import row_of, run
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
-from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import (
+    PLATFORM,
+    BodyPlace,
+    MechanismState,
+    PassiveJoint,
+    StructureLoad,
+)
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    COEFFICIENT,
+    JOINT_EFFORT,
+    RIGID,
+    VISCOUS,
+    WIDTH,
+)
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveFriction
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveParameters
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
@@ -51,6 +57,9 @@ POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.
 MOST_CONDITIONS = 64
+# Samples up to which everything is stored with the forces: a node checks the drives' motion before
+# it answers; of a recording, writing it would take longer than calculating it where it is needed.
+SHORT = 2048
 
 
 class SingularityBounds(NamedTuple):
@@ -102,12 +111,11 @@ class ClosedForm:
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
             table = np.empty((closed_form.EVERYTHING, len(motion), 6))
             parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
-            self.is_regular = evaluate(
-                closed_form.forces_kernel, parameters, motion.rows, loads, table) < 0
+            self.is_regular = run(closed_form.forces, parameters, motion.rows, loads, table) < 0
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
-        self.efforts, self.guide_load = table[closed_form.RIGID], table[closed_form.GUIDE_LOAD]
+        self.efforts, self.guide_load = table[RIGID], table[closed_form.GUIDE_LOAD]
         self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
         self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
 
@@ -143,7 +151,7 @@ class ClosedForm:
 
         By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
         """
-        found: Array = loads._with(joints).table[closed_form.PASSIVE]
+        found: Array = loads._with(joints).table[JOINT_EFFORT]
         return found
 
     def _with(self, joints: Joints) -> ClosedForm:
@@ -186,6 +194,23 @@ class ClosedForm:
             raise SingularityError(
                 worst, f'the condition number of the drive Jacobian is {number[worst]:.4g}',
                 f'limits.condition_number is {bounds.condition_number:g}')
+
+
+class PassResult(NamedTuple):
+    """Results of one pass: tables of `closed_form`, of long motions of the forces alone."""
+
+    efforts: Array
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether there are more tables than those of forces."""
+        return len(self.efforts) > closed_form.FORCES
+
+    @property
+    def drive_motion(self) -> Any:
+        """A function that returns the drives' motion, None where it is not known."""
+        first = closed_form.POSITION
+        return (lambda: tuple(self.efforts[first:first + 3])) if self.is_complete else None
 
 
 def condition_number(geometry: Geometry, J: Array) -> Array:
@@ -263,7 +288,7 @@ class ThreePprs:
     @property
     def numbers(self) -> Array:
         """All numbers that determine the forces, in one row."""
-        return KernelParameters(self.kernel_parameters).row
+        return row_of(self.kernel_parameters)
 
     @property
     def position_step(self) -> float:
@@ -271,9 +296,12 @@ class ThreePprs:
         return POSITION_STEP * self.geometry.rod_length
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       ) -> Joints:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
-        return Joints.of(blocks, reversal.rate)
+                       is_own: bool = False) -> Joints:
+        """Return friction of joints as `MechanismState.against_friction` takes it.
+
+        Only the model's own may be printed.
+        """
+        return Joints.of(blocks, reversal.rate, is_own and self.printed)
 
     def heavier(self, link: str, mass: float) -> ThreePprs:
         """Return the robot with a payload, or with rods, that weigh more [kg].
@@ -306,17 +334,33 @@ class ThreePprs:
         return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
                                Vector(*self.gravity))
 
-    def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
-                   ) -> KernelParameters[closed_form.ForcesParameters]:
-        """Return the parameters of `forces_kernel` with friction of joints and drives."""
-        return KernelParameters(closed_form.ForcesParameters(
+    def parameters(self, joints: Joints, drives: tuple[DriveParameters, ...],
+                   ) -> Array:
+        """Return the parameters of `closed_form.forces` with friction of joints and drives."""
+        return row_of(closed_form.ForcesParameters(
             self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
             self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives))
 
-    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
-                     ) -> Mechanism:
+    def friction_parameters(self, joints: Joints, drives: Array) -> Array:
+        """Return friction of joints and numbers of drives, (OF_DRIVE, 6), for `one_pass`."""
+        return self.parameters(joints, tuple(
+            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist()))
+
+    def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
+                 ) -> PassResult | None:
+        """Return the forces for a motion, friction included.
+
+        None where a sample may be out of reach or too near a singularity.
+        """
+        rows = motion.rows
+        table = np.empty((closed_form.EVERYTHING if len(rows) <= SHORT else closed_form.FORCES,
+                          len(rows), 6))
+        first = run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table)
+        return PassResult(table) if first < 0 else None
+
+    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
-        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts), is_free)
+        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts))
         bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
         return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(COUNT),
                          self.gravity)
@@ -368,8 +412,8 @@ class ThreePprs:
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
     def state(self, motion: PlatformMotion, reversal: Reversal, friction: object = None,
-              closed: object = None, found: ClosedForm | None = None) -> MechanismState:
-        """Return the state for a platform motion, of which the kinematics may be known already.
+              closed: object = None, found: PassResult | None = None) -> MechanismState:
+        """Return the state for a platform motion; `found` as of `one_pass`.
 
         Raises
         ------
@@ -378,15 +422,15 @@ class ThreePprs:
         SingularityError
             For a pose nearer to a singularity than `bounds` allow.
         """
-        if found is None:
-            # Very large numbers overflow; users of the result check that it is finite.
-            with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-                found = ClosedForm(self, motion)
-                if not found.is_regular:
-                    found.require_regular()
-        return MechanismState(found.position, found.velocity, found.acceleration, motion.time,
+        # Very large numbers overflow; users of the result check that it is finite.
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            links = ClosedForm(self, motion, table=(
+                found.efforts if found is not None and found.is_complete else None))
+            if not links.is_regular:
+                links.require_regular()
+        return MechanismState(links.position, links.velocity, links.acceleration, motion.time,
                               channels=motion.channels, robot=self, reversal=reversal,
-                              known=found, motion=motion)
+                              known=links, motion=motion)
 
     def remember(self, state: MechanismState, closed: object) -> None:
         """Store nothing: poses have a closed form."""

@@ -14,7 +14,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.description import (
-    FIXED,
     FLOATING,
     PARAMETERS,
     PRISMATIC,
@@ -24,7 +23,6 @@ from pprs_dynamics.physics.mechanism.description import (
     Joint,
     Loop,
     body_at,
-    rotation_of,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
@@ -46,8 +44,8 @@ def structure_of(geometry: Geometry) -> Structure:
 
 
 def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Array, Array],
-                   is_free: bool = True) -> Structure:
-    """Return the joints, closures and bodies of a 3-PPRS.
+                   ) -> Structure:
+    """Return the joints, closures and bodies of a 3-PPRS, whose platform is a free body.
 
     Parameters
     ----------
@@ -55,9 +53,6 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
     masses : Masses
     limits : tuple of three (6,) arrays
         Lowest and highest position of each drive [m], and its largest force [N].
-    is_free : bool, optional
-        Whether the platform is a free body that three spherical closures hold. Otherwise it hangs
-        on the first rod by three revolute joints, and two closures remain.
     """
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
     platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
@@ -65,7 +60,6 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
     joints: dict[str, Joint] = {}
     loops: list[Loop] = []
     home: dict[str, float] = {}
-    turned = {}
     e_x, e_y, e_z = np.eye(3)
 
     def hang(joint: str, joint_kind: str, parent: str, child: str, frame: Frame, axis: Array,
@@ -88,26 +82,12 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
         u = geometry.elbow_sign * math.acos(cos_u)
         home |= {f'slide_{n}': r * math.sin(beta - delta),
                  f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
-        turned[n] = rotation_of((0.0, 0.0, delta)) @ rotation_of((0.0, u, 0.0))
         end = Frame(p=np.array([r * math.cos(beta), r * math.sin(beta), 0.0]))
         loops.append(Loop(f'ball_{n}', 'spherical', f'rod_{n}', Frame(p=np.array([-l, 0.0, 0.0])),
                           'platform', end))
     links['platform'] = platform
-    poses: dict[str, Frame] = {}
-    if is_free:
-        hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
-        poses['platform'] = Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))
-    else:
-        ball, *loops = loops
-        at = Frame(turned[1].T, ball.frame_a.p)
-        for letter, parent, child, axis in (
-                ('x', 'rod_1', 'ball_1_x', e_x), ('y', 'ball_1_x', 'ball_1_y', e_y),
-                ('z', 'ball_1_y', 'ball_1_z', e_z)):
-            links[child] = np.zeros(PARAMETERS)
-            hang(f'ball_1_{letter}', REVOLUTE, parent, child, at, axis)
-            at = Frame()
-            home[f'ball_1_{letter}'] = 0.0
-        hang('platform_mount', FIXED, 'ball_1_z', 'platform', ball.frame_b.inverse, e_x)
+    hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
+    poses = {'platform': Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
     for drive, lower, upper, effort in zip(DRIVES, *limits, strict=True):
         joints[drive] = replace(joints[drive], lower=float(lower), upper=float(upper),
                                 effort=float(effort))

@@ -17,6 +17,9 @@ from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 IDLE = 3600.0  # [s] period of a timer that is cancelled
 LOOKS = 4  # within a timeout, at whether ROS time still advances
 SHORTEST_LOOK = 1_000_000  # [ns]
+# [ns] of steady time without an advance of /clock: simulators may publish it at 2 Hz, and a busy
+# machine delays it by some tenths of a second.
+CLOCK_STANDS = 1_000_000_000
 MISSING_CLOCK = ('use_sim_time is true and nothing has come on /clock: stamps count from 0, and '
                  'timers of the simulation do not run')
 
@@ -41,8 +44,9 @@ class CommandWatchdog:
     """Calls back once when the command of the last trajectory has gone stale.
 
     It is stale when ROS time has passed the end of the trajectory by the timeout. It is also stale
-    when ROS time has not advanced for the timeout of steady time, as where a simulation stops or
-    its clock never comes. Time that is set back counts as no advance.
+    when ROS time has not advanced for a second of steady time, or for the timeout if that is
+    longer, as where a simulation stops or its clock never comes. Time that is set back counts as
+    no advance.
 
     Parameters
     ----------
@@ -107,7 +111,8 @@ class CommandWatchdog:
     def _look(self) -> None:
         self._note_time()
         timeout = round(self._timeout() * NANOSECONDS)
-        stands = self._steady.now().nanoseconds - self._advanced >= timeout
+        stands = (self._steady.now().nanoseconds - self._advanced
+                  >= max(timeout, CLOCK_STANDS))
         if timeout and self.fresh and (stands or self._left + timeout <= 0):
             self.stop()
             self._stale(stands)

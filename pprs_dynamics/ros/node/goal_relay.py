@@ -129,23 +129,16 @@ class GoalRelay:
         """Return whether discovery knows a server, as soon as it does and after a while at most."""
         if self.server_is_there():
             return True
-        found: Future[bool] = Future()
         deadline, was_there = time.monotonic() + DISCOVERY, False
 
-        def look() -> None:
+        def look() -> bool | None:
             nonlocal was_there
             # Discovery is one-sided: a server may see us a moment after we see it, and its answer
             # to a goal in between is lost.
-            is_there = self.server_is_there()
-            if not found.done() and (was_there or time.monotonic() > deadline):
-                found.set_result(is_there)
-            was_there = is_there
+            before, was_there = was_there, self.server_is_there()
+            return was_there if before or time.monotonic() > deadline else None
 
-        timer = steady_timer(self._node, LOOK_PERIOD, look)
-        try:
-            return bool(await found)
-        finally:
-            self._node.destroy_timer(timer)
+        return bool(await self._first(look, Future()))
 
     def cancel(self, handle: Any) -> None:
         """Cancel what was sent on for a goal, if anything was."""
@@ -155,21 +148,25 @@ class GoalRelay:
 
     async def _lost(self, answer: Any, watched: _Watched) -> str:
         """Wait for an answer; return why none will come, or '' where it is there."""
-        ended: Future[str] = Future()
-
-        def end(said: str) -> None:
-            if not ended.done():
-                ended.set_result(said)
-
-        def look() -> None:
+        def look() -> str | None:
             patience = self._patience()
             if not self.server_is_there():
-                end(f'the server of {self._name} has gone')
-            elif patience and watched.silence() > patience:
-                end(f'the server of {self._name} has been silent for {patience:g} s')
+                return f'the server of {self._name} has gone'
+            if patience and watched.silence() > patience:
+                return f'the server of {self._name} has been silent for {patience:g} s'
+            return None
 
-        timer = steady_timer(self._node, LOOK_PERIOD, look)
-        answer.add_done_callback(lambda _: end(''))
+        ended: Future[str] = Future()
+        answer.add_done_callback(lambda _: ended.done() or ended.set_result(''))
+        return str(await self._first(look, ended))
+
+    async def _first(self, look: Callable[[], Any], ended: Future[Any]) -> Any:
+        """Return the first value of `look` that is not None, or that of a future that is done."""
+        def tick() -> None:
+            if not ended.done() and (value := look()) is not None:
+                ended.set_result(value)
+
+        timer = steady_timer(self._node, LOOK_PERIOD, tick)
         try:
             return await ended
         finally:

@@ -17,7 +17,6 @@ from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
-    KEYS,
     NODE_KEYS,
     NODE_PREFIXES,
 )
@@ -150,8 +149,6 @@ class ModelParameters:
     node_values : dict
         Values of the node's own parameters.
     history : ModelHistory or None
-    taken_from_paper : list of str
-        Keys without a value of their own; none where a whole model was given.
 
     Raises
     ------
@@ -169,7 +166,7 @@ class ModelParameters:
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
-        taken_from_paper = declare_model(node, arguments)
+        declare_model(node, arguments)
         self._stays: dict[str, Any] = {}
         self._node, self._declared = node, parameters
         self.model, self.node_values = follow(node, self._validated, self._apply)
@@ -177,13 +174,8 @@ class ModelParameters:
         if not self.node_values[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())
         self._stays = self._staying(self.model, self.node_values)
-        # A status entry, and a line in the log: another robot would get wrong forces.
-        self.taken_from_paper = taken_from_paper
-        if taken_from_paper:
-            node.get_logger().warning(
-                'no geometry is given: this is the paper\'s robot'
-                + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
-                   if len(taken_from_paper) < len(KEYS) else ''))
+        if not has_model(given):  # another robot would get wrong forces
+            node.get_logger().warning('demo: the model is that of the paper\'s robot')
 
     def _validated(self, changes: Iterable[Parameter]) -> tuple[DriveModel, dict[str, Any]]:
         self._refuse_foreign(changes)

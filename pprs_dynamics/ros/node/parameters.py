@@ -21,7 +21,6 @@ from pprs_dynamics.physics.model.keys import (
     ANY,
     DRIVES_KEY,
     FILES,
-    KEYS,
     Key,
     as_list,
     is_described,
@@ -135,15 +134,10 @@ def has_model(given: Mapping[str, Any]) -> bool:
         name.startswith('geometry.') for name in given)
 
 
-def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
+def declare_model(node: Node, arguments: Sequence[str]) -> None:
     """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
 
     A relative path of a mechanism's URDF becomes an absolute one, by the node's command line.
-
-    Returns
-    -------
-    list of str
-        Keys of a 3-PPRS that were given neither in a file nor on the command line.
 
     Raises
     ------
@@ -167,7 +161,6 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
         # The ledger is for `pprs history`: a page of numbers that no node reads.
         if not node.has_parameter(name) and not name.startswith(HISTORY):
             node.declare_parameter(name, value, _added_descriptor(name), ignore_override=True)
-    return [name for name in KEYS if name not in given and name in defaults]
 
 
 def _declare(node: Node, key: Key, value: Any) -> None:

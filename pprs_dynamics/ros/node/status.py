@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Status of a node: JSON on `~/status`, and `/diagnostics` where that package is."""
+"""Status of a node: JSON on `~/status`, `/diagnostics` where that package is, and the log."""
 
 from __future__ import annotations
 
 import json
+import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -24,6 +26,7 @@ except ImportError:
     DiagnosticArray = None
 
 WINDOW = 1000  # durations that are summed up
+LOG_PERIOD = 1.0  # [s] between lines of one code
 # On /diagnostics STALE is the word of an aggregator that hears nothing: a stream that broke off is
 # an error that the node tells.
 TOLD_AS = {'STALE': 'ERROR'}
@@ -31,6 +34,9 @@ TOLD_AS = {'STALE': 'ERROR'}
 
 class StatusReporter:
     """Publishes level, code, message and counters on change and at 1 Hz.
+
+    Errors go to the log as well, each code once a second, and warnings when they begin. rclpy's own
+    throttling looks up its caller first, which takes longer than an answer to a message.
 
     Parameters
     ----------
@@ -57,6 +63,7 @@ class StatusReporter:
         if DiagnosticArray is not None:
             self._diagnostics = publisher(node, DiagnosticArray, '/diagnostics')
         self._current: tuple[Level, Code, str] = ('OK', 'OK', 'waiting for the first message')
+        self._log_due: dict[Code, float] = {}
         steady_timer(node, 1.0, self._tick)
         self._publish()
 
@@ -69,6 +76,11 @@ class StatusReporter:
         """Take over a new condition; it goes out at once where the code changed."""
         changed = (level, code) != self._current[:2]
         self._current = (level, code, message)
+        if level == 'ERROR' or (changed and level != 'OK'):
+            now = time.monotonic()
+            if now >= self._log_due.get(code, now):
+                self._log_due[code] = now + LOG_PERIOD
+                self._node.get_logger().warning(f'{code}: {message}')
         if changed:
             self._publish()
 
@@ -101,28 +113,13 @@ class StatusReporter:
             self._diagnostics.publish(array)
 
 
-class Durations:
-    """The last thousand durations [s], and the longest of all."""
+class Durations(deque[float]):
+    """The last thousand durations [s]."""
 
     def __init__(self) -> None:
-        self._recent, self._count, self._longest = np.zeros(WINDOW), 0, 0.0
+        super().__init__(maxlen=WINDOW)
 
-    def add(self, duration: float) -> None:
-        """Take one more [s]."""
-        self._recent[self._count % WINDOW] = duration
-        self._count += 1
-        if duration > self._longest:
-            self._longest = duration
-
-    @property
-    def median(self) -> float:
-        """Of the last thousand [s]; 0 where there was none."""
-        return float(np.median(self._recent[:self._count])) if self._count else 0.0
-
-    def summary(self) -> dict[str, Any]:
-        """Return p50 and p99 of the last thousand, and max of all [s], None where none was."""
-        if not self._count:
-            return {'p50': None, 'p99': None, 'max': None}
-        p50, p99 = np.percentile(self._recent[:self._count], (50, 99))
-        return {'p50': round(float(p50), 7), 'p99': round(float(p99), 7),
-                'max': round(self._longest, 7)}
+    def summary(self) -> dict[str, float | None]:
+        """Return p50, p99 and max [s], None where there was no duration."""
+        found = np.percentile(self, (50, 99, 100)).tolist() if self else (None,) * 3
+        return dict(zip(('p50', 'p99', 'max'), found, strict=True))

@@ -1,11 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Any model as a mechanism: a tree of bodies with closures, for files of simulators.
-
-In MJCF the platform of a 3-PPRS is free and held by three balls. In URDF it hangs on the first
-chain by three hinges in a row, and two balls are cut: programs without free joints draw it, too.
-"""
+"""Any model as a mechanism: a tree of bodies with closures, for files of simulators."""
 
 from __future__ import annotations
 
@@ -18,19 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.description import (
-    FLOATING,
-    Frame,
-    principal_inertia,
-)
+from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, principal_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.export.expressed import (
-    URDF,
-    Expressed,
-    express,
-)
+from pprs_dynamics.simulation.export.expressed import URDF, Expressed, express
 
 FREE, HINGE, SLIDE = 'free', 'hinge', 'slide'
 # Simulators want some mass of everything that moves [kg, kg m^2]; ten decimals below real ones.
@@ -114,8 +102,8 @@ class ExportedRobot:
                 yield name, row, frame
 
 
-def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
-    """Return what a file of a format says.
+def export_robot(expressed: Expressed) -> ExportedRobot:
+    """Return the robot that a file describes.
 
     Raises
     ------
@@ -125,9 +113,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     model, robot = expressed.model, expressed.robot
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    limits = model.limits
-    mechanism = robot.as_mechanism(limits.strokes, limits.efforts, is_free=kind != URDF)
-    return described('three_pprs', mechanism, expressed.joints)
+    return described('three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts),
+                     expressed.joints)
 
 
 def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
@@ -216,7 +203,7 @@ class TreePositions:
     """
 
     def __init__(self, model: DriveModel) -> None:
-        robot = export_robot(express(model, URDF), URDF)
+        robot = export_robot(express(model, URDF))
         self._mechanism = robot.mechanism
         joints = [body for body in robot.bodies if body.kind != FREE]
         free = [body for body in robot.bodies if body.kind == FREE]

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
+from pprs_dynamics.physics.model.keys import APPROACHES
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -34,7 +34,7 @@ SPRINGREF = 'springref'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
-HINGES = ('hinge_1', 'hinge_2', 'hinge_3')  # C_i of the 3-PPRS
+HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
 # Of effects on drives: their parameters as a joint's.
 OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
     ViscousFriction: {'coefficient': DAMPING},
@@ -99,7 +99,7 @@ def express(model: DriveModel, kind: str) -> Expressed:
             left.append('robot.gravity' if model.moves_joints else 'gravity')
         robot = replace(robot, gravity=STANDARD_GRAVITY)
         left += ([loop.name for loop in model.robot.structure.loops] if model.moves_joints
-                 else ['ball_2', 'ball_3'])
+                 else list(BALLS))
     return Expressed(model, robot, {
         name: {key: value for key, value in numbers.items() if value}
         for name, numbers in joints.items()}, tuple(left))
@@ -131,7 +131,7 @@ def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
             if values[f'friction.{joint}.diameter']), 'friction.spherical.viscous'):
         if np.any(values[key]):
             yield key, None
-    if values['friction.approach'] != WholeMechanismFriction.approach:
+    if values['friction.approach'] != APPROACHES[0]:
         yield 'friction.approach', None
     if values['equations'] != 'corrected':
         yield 'equations', None

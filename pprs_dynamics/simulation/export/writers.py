@@ -16,13 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.simulation.export.exported_robot import (
-    FREE,
-    HINGE,
-    SLIDE,
-    Body,
-    ExportedRobot,
-)
+from pprs_dynamics.simulation.export.exported_robot import FREE, HINGE, SLIDE, Body, ExportedRobot
 from pprs_dynamics.simulation.export.expressed import (
     ARMATURE,
     DAMPING,

@@ -36,7 +36,8 @@ def listening(host: str, port: int) -> socket.socket:
         found.listen(MOST_CONNECTIONS)
     except (OSError, UnicodeError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
-        raise ListenError(f'{displayed(host)}:{port}: cannot be listened on: {reason}') from None
+        raise ListenError(f'{displayed(host)}:{port}: cannot be listened on: {reason}; '
+                          '--host must be an address of this machine, --port a free port') from None
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class BaseTilt(BodyEffect):

@@ -16,7 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.mechanism.places import MECHANISM
+from pprs_dynamics.physics.mechanism.state import MECHANISM
 
 PRESSURE = 'pressure'
 # Over less of a turn [rad] it is a spring like any other.

@@ -18,9 +18,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
 
 
 class CoupledDrives(StructureEffect):

@@ -13,10 +13,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter, Wave
-from pprs_dynamics.physics.effects.laws.friction_temperature import (
-    middle_temperature,
-    warmer_than,
-)
+from pprs_dynamics.physics.effects.laws.friction_temperature import middle_temperature, warmer_than
 
 # Waves of the constant in a turn of the motor: excentric, of two phases against each other, of
 # pole pairs.

@@ -17,7 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter, Wave
-from pprs_dynamics.physics.mechanism.places import MECHANISM
+from pprs_dynamics.physics.mechanism.state import MECHANISM
 
 TURN = 2 * math.pi
 

@@ -18,7 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 LINK_POSITION = 'link_position'
 # Usual compliances of screws and belts, of gears and shafts [m/N, rad/(N m)].

@@ -13,7 +13,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class HomingError(MeasurementEffect):

@@ -17,9 +17,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 
@@ -131,5 +130,5 @@ class ModelJointFriction(Effect):
     def table(self, robot: Any, reversal: Reversal) -> Any:
         """Return its friction as states of a robot take it, once for each way to turn over."""
         if reversal not in self._tables:
-            self._tables[reversal] = robot.friction_table(self.blocks, reversal)
+            self._tables[reversal] = robot.friction_table(self.blocks, reversal, is_own=True)
         return self._tables[reversal]

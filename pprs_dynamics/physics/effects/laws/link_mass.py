@@ -9,7 +9,7 @@ from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.mechanism.alike import alike_links
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class LinkMass(AddedBody):

@@ -21,7 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 # On either side of the travel through the play, of its length: there the link may separate from the
 # flank. A polynomial through its motion before and after, as long as that, determines it.

@@ -9,7 +9,7 @@ from math import inf
 from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, body_parameters
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, BodyPlace
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, BodyPlace
 
 
 class PayloadMass(AddedBody):

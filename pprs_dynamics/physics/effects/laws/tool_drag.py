@@ -9,9 +9,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
-from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
 
 
 class ToolDrag(BodyEffect):
