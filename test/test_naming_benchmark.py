@@ -5,12 +5,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import pytest
 
 from benchmarks.naming.entrants.controls import perfect
-from benchmarks.naming.generate import draws
 from benchmarks.naming.problems import Answer, Named, Truth
 from benchmarks.naming.scoring import FIGURES, Scored, figures, judge
 
@@ -67,16 +64,3 @@ def test_intervals_are_held_against_the_truth() -> None:
     assert judge(DRIFT, said(3.1, 0.1)).covered == (True,)
     assert judge(DRIFT, said(3.3, 0.1)).covered == (False,)
     assert judge(DRIFT, said(3.3, None)).covered == ()
-
-
-def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:
-    first, again = list(draws(5, 72)), list(draws(5, 72))
-    assert first == again
-    assert len({draw.name for draw in first}) == 72
-    assert first[:12] == list(draws(5, 12))
-    count = Counter(draw.kind for draw in first)
-    assert count == {'single': 36, 'nothing': 12, 'two': 6, 'three': 6, 'unknown': 6, 'form': 6}
-    for what in ('robot', 'noise'):
-        assert min(Counter(getattr(draw, what) for draw in first).values()) >= 10
-    assert {draw.snr for draw in first if draw.kind == 'single'} == {0.5, 1.0, 2.0, 5.0, 20.0}
-    assert not any(name in draw.name for draw in first for name in draw.names)

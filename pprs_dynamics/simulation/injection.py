@@ -479,11 +479,18 @@ def _eccentric_encoder(run: Injection) -> Injected:
 
 
 def _payload_mass(run: Injecting) -> Injected:
-    """Hang a point of a share of the robot's mass 5 cm before the tool."""
-    engine = run.engine
+    """Hang a point of a share of the robot's mass 5 cm before the tool.
+
+    On a 3-PPRS at the centre of mass of platform and payload, as the effect is defined there.
+    """
+    engine, robot = run.engine, run.engine.robot
     share = run.sizes(lambda: {'share': run.size(0.05, 0.12)})['share']
-    mass = share * float(engine.robot.masses.sum())
-    engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, 0.05), np.zeros((3, 3))))
+    mass, tool = share * float(robot.masses.sum()), engine.structure.tool
+    centre = np.array([0.0, 0.0, 0.05])
+    if isinstance(run.model, PlatformMechanism):
+        row, frame = engine.structure.links[tool]
+        centre = frame.inverse.of_point(robot.by_joint[row, 1:4] / robot.by_joint[row, 0])
+    engine.carry(tool, body_at(mass, tuple(centre), np.zeros((3, 3))))
     return None, {'mass': mass}
 
 

@@ -21,3 +21,17 @@ def require_file(path: str | PathLike[str]) -> None:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     if not stat.S_ISREG(mode):
         raise UnreadableFileError(path, f'it is {kind_of(mode)}, must be a file')
+
+
+def require_files(model: str, parameters: str) -> list[str]:
+    """Return a launch's model file and its further file of parameters, '' for none.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where one is no file: launch would leave it out, in a line among many.
+    """
+    files = [model, *([parameters] if parameters else [])]
+    for file in files:
+        require_file(file)
+    return files

@@ -9,7 +9,6 @@ import json
 import struct
 from pathlib import Path
 
-import numpy as np
 import pytest
 from pprs_command import pprs
 
@@ -50,15 +49,3 @@ def test_reproduce_is_honest_about_what_does_not_come_out(reproduced: Path) -> N
     assert '0.93 N rms active, 0.13 N rms passive' in claims[1]['found']
     assert '0.000 N rms by the second' in claims[2]['found']
     assert '48.2 to 109.5 degrees' in claims[4]['found']
-
-
-def test_the_curves_leave_a_gap_where_the_second_approach_is_not_defined(reproduced: Path) -> None:
-    curves = np.genfromtxt(reproduced / 'new/output/forces.csv', delimiter=',', names=True)
-    first, second = curves['slide_1whole_mechanism'], curves['slide_1independent_chains']
-    assert np.isfinite(first).all()
-    assert 0.05 < np.isnan(second).mean() < 0.5
-    assert np.nanmax(np.abs(curves['lift_1independent_chains'])) < 20.0
-    # rms of the frictionless forces: 3.43, 3.93, 3.93, 13.41, 13.41, 13.41 N.
-    rms = [np.sqrt(np.mean(curves[f'{drive}Q'] ** 2)) for drive in (
-        'slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')]
-    np.testing.assert_allclose(rms, [3.43, 3.93, 3.93, 13.41, 13.41, 13.41], atol=0.005)

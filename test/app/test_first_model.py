@@ -114,12 +114,6 @@ def named(folder: Path) -> list[Path]:
     return [folder / 'run.csv']
 
 
-def without_header(folder: Path) -> list[Path]:
-    np.savetxt(folder / 'run.csv', np.column_stack([TIME, Q, DQ, TAU]), delimiter=',',
-               fmt='%.17g')
-    return [folder / 'run.csv']
-
-
 def with_what_was_asked_for(folder: Path) -> list[Path]:
     # Of an arm's log: measured, then accelerations, then what was asked for; rows end in commas.
     ddq = -(Q - [0.3, -0.4, 0.1]) * WAVES**2
@@ -127,12 +121,6 @@ def with_what_was_asked_for(folder: Path) -> list[Path]:
     (folder / 'log.csv').write_text(''.join(
         ','.join(map(repr, row)) + ',\n' for row in rows.tolist()))
     return [folder / 'log.csv']
-
-
-def in_degrees(folder: Path) -> list[Path]:
-    np.savetxt(folder / 'run.txt', np.column_stack(
-        [TIME, np.rad2deg(2 * Q), np.rad2deg(2 * DQ), TAU]), fmt='%.17g')
-    return [folder / 'run.txt']
 
 
 def structure(folder: Path) -> list[Path]:
@@ -161,11 +149,6 @@ def commands_with_unknown_names(folder: Path) -> list[Path]:
     frame({'t': TIME, **columns('q_a_{k}', np.roll(Q, -3, axis=0)), **columns('q_b_{k}', Q),
            **columns('tau_{k}', TAU)}).to_csv(folder / 'run.csv', index=False)
     return [folder / 'run.csv']
-
-
-def matrix(folder: Path) -> list[Path]:
-    np.save(folder / 'run.npy', np.column_stack([TIME, Q, DQ, TAU]))
-    return [folder / 'run.npy']
 
 
 def one_file_each(folder: Path) -> list[Path]:
@@ -210,18 +193,13 @@ def currents(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize('write', [
-    plotjuggler, numbered, named, without_header, with_what_was_asked_for, in_degrees, structure,
-    of_a_european_spreadsheet, joined_logs, commands_with_unknown_names, matrix, one_file_each,
-    lerobot, bag, currents])
+    plotjuggler, numbered, named, with_what_was_asked_for, structure, of_a_european_spreadsheet,
+    joined_logs, commands_with_unknown_names, one_file_each, lerobot, bag, currents])
 def test_what_init_writes_reads_the_recording_as_it_was(
     write: Callable[[Path], list[Path]], robot: Path, tmp_path: Path,
 ) -> None:
     recording = read(robot, *write(tmp_path))
-    if write is in_degrees:
-        np.testing.assert_allclose(recording.position, 2 * Q, atol=1e-9)
-        np.testing.assert_allclose(recording.velocity, 2 * DQ, atol=1e-9)
-    else:
-        assert_read(recording, recording.velocity is not None)
+    assert_read(recording, recording.velocity is not None)
 
 
 def test_the_tool_is_the_flange_and_the_base_what_all_hangs_on(robot: Path) -> None:

@@ -45,8 +45,3 @@ def test_every_page_is_linked_from_another() -> None:
 def test_a_link_that_leads_nowhere_is_found(link: str) -> None:
     text = f'# Heading\n[good](docs/nodes.md) [good](#heading) ![bad]({link}) `[code](x.md)`'
     assert broken(PROJECT / 'README.md', text) == [link]
-
-
-def test_anchors_are_those_of_sites_that_show_markdown() -> None:
-    text = '# Node `feedforward`\n## A, b & c\n## A, b & c\n```\n# no heading\n```\n'
-    assert anchors(text) == {'node-feedforward', 'a-b--c', 'a-b--c-1'}

@@ -18,6 +18,7 @@ import pytest
 from documents import FENCE, PROJECT, code, pages, text_of
 
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser
+from pprs_dynamics.inference.search.decisions import OUTSIDE_COST
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
 from pprs_dynamics.physics.model.parameter_values import is_known
@@ -198,3 +199,11 @@ def test_codes_of_the_status_are_those_of_its_schema_and_of_the_page() -> None:
     assert schema['code']['enum'] == list(CODES)
     page = (PROJECT / 'docs/nodes.md').read_text(encoding='utf-8')
     assert [code for code in CODES if not re.search(rf'^\|[^|]*`{code}`', page, re.M)] == []
+
+
+def test_the_page_lists_at_most_twelve_rules_outside_the_cost() -> None:
+    import_module('pprs_dynamics.inference.adoption.adopt')  # lists all rules
+    text = (PROJECT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')
+    assert 0 < len(OUTSIDE_COST) <= 12
+    for name, rule in OUTSIDE_COST.items():
+        assert f'| {rule} | `{name}` |' in text

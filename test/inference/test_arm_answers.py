@@ -84,20 +84,3 @@ def test_another_mounting_is_named_with_the_line_of_the_model_file(
     assert {looks.kind for looks in found.effort_looks_like.values()} == {'mounting'}
     line = f'robot: {{gravity: [{x:.1f}, 0.0, {z:.1f}]}}'
     assert line in next_step(found, GivenFiles())[0]
-
-
-@pytest.mark.parametrize('hidden', [
-    {'gravity': (0.5, -9.8)}, {'force': (3.0, 4.0), 'forward': 0.5, 'backward': 0.1}])
-def test_a_reported_effect_lowers_the_error_and_raises_that_of_no_drive(
-    arm: DriveModel, hidden: dict[str, object],
-) -> None:
-    run, other = (recorded(**hidden, seed=seed) for seed in (1, 2))  # type: ignore[arg-type]
-    found = diagnose(arm, [run], [other])
-    assert found.effects
-    before, after = (np.sqrt(np.nanmean(np.square(error), axis=0))
-                     for error in (found.residuals.error, found.remaining))
-    assert np.all(after < 1.01 * np.maximum(before, list(found.noise_floors.values())))
-    for effect in found.effects:
-        assert effect.certainty > 2
-        assert effect.error_after < effect.error_before
-        assert effect.held_out_after < effect.held_out_before

@@ -16,9 +16,7 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, design
 from pprs_dynamics.inference.experiments.next_experiment import COMMISSION, next_experiment
-from pprs_dynamics.inference.experiments.question import commissioning
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -45,27 +43,6 @@ def test_it_keeps_the_limits_with_their_margin(model: DriveModel, found) -> None
     assert np.all(np.abs(motion.acceleration) <= 0.901 * 5.0)
     assert np.all(np.abs(model.drive_forces(motion).total) <= 0.91 * tree.effort)
     assert max(found.limits.values()) <= 1.001
-
-
-def test_it_is_a_motion_from_rest_to_rest(found) -> None:
-    time = np.linspace(0, DURATION, 5001)
-    motion = found.motion(time)
-    for quantity in (motion.velocity, motion.acceleration):
-        assert np.abs(quantity[[0, -1]]).max() < 1e-9
-    for before, after in ((motion.position, motion.velocity),
-                          (motion.velocity, motion.acceleration)):
-        assert np.gradient(before, time, axis=0)[1:-1] == pytest.approx(after[1:-1], abs=2e-3)
-
-
-def test_a_design_tells_more_than_motions_drawn_at_random(model: DriveModel) -> None:
-    motions = Motions(model, MotionLimits(), DURATION, (8,))
-    question = commissioning(model, (), motions)
-
-    def worth(series) -> float:
-        return question.worth(question.gram(motions, series))
-
-    found = design(motions, motions.drawn(1), worth, 1)
-    assert worth(found) > max(map(worth, motions.drawn(99, 20)))
 
 
 def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:

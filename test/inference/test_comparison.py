@@ -14,9 +14,6 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics.inference.diagnosis.comparison import Localisation, compare
-from pprs_dynamics.inference.regression.joint_fit import Regression
-from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.profiles import error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01
@@ -40,12 +37,6 @@ def recording(error: np.ndarray, effort: np.ndarray) -> Residuals:
         model, {'rigid_body': 0.9 * model, 'passive_friction': 0.1 * model},
         {'position': np.stack([np.sin(time + k) for k in range(width)], axis=1),
          'velocity': np.stack([np.cos(time + k) for k in range(width)], axis=1)}, PERIOD)
-
-
-def noise_of(residuals: Residuals) -> NoiseSpectrum:
-    """Return the noise of the first drive."""
-    regression = Regression(residuals)
-    return regression.noise(regression.fit(()))[0]
 
 
 @pytest.mark.parametrize('width', [1, 6])
@@ -106,20 +97,6 @@ def test_noise_is_called_noise_and_an_error_beyond_it_is_not() -> None:
     # What is left is known to a few per cent: the noise model is fitted to 3000 samples.
     assert loud.unexplained == pytest.approx(0.5, rel=0.1)
     assert loud.verdict.endswith('poor')
-
-
-def test_profiles_hold_the_mean_within_their_uncertainty() -> None:
-    rng = np.random.default_rng(12)
-    off = []
-    for _ in range(20):
-        noise = ar1(0.9, 3000, rng)[:, None]
-        profile = error_profile(recording(noise + 0.7, np.zeros((3000, 1))), 0, 'position',
-                                noise_of(recording(noise, np.zeros((3000, 1)))))
-        assert profile is not None
-        assert profile.samples.sum() == 3000
-        off.append((profile.mean - 0.7) / profile.uncertainty)
-    # The bins of one record go together; over twenty the spread is known to about a tenth.
-    assert np.std(off) == pytest.approx(1.0, abs=0.3)
 
 
 def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:

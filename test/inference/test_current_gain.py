@@ -11,7 +11,7 @@ from made_up_arm import motion, real_arm
 from numpy.testing import assert_allclose
 
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.inference.regression.design import Design, searched_in_drives
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
 
@@ -66,12 +66,3 @@ def test_columns_are_differences_of_models(arm):
                        np.array([0, 0, 0.01]))):
         changed = Design.of(with_gain(arm, **values), [recorded(arm, arm)])
         assert_allclose(changed.forces[:, JOINT] - design.forces[:, JOINT], c @ rows, atol=1e-9)
-
-
-def test_without_temperature_and_gear_it_is_not_tried(arm):
-    at = motion(20.0)
-    run = Recording.from_arrays('x', at.time, at.position, None, arm.drive_forces(at).total,
-                                arm.drives)
-    design = Design.of(arm, [run])
-    assert CurrentGain in searched_in_drives(design)
-    assert [design.acts_on(CurrentGain, d) for d in range(3)] == [True, True, False]

@@ -12,9 +12,6 @@ import pytest
 from model_recordings import record, with_effects
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.fleet.recordings import SurveyedRecording
-from pprs_dynamics.app.fleet.store import AUTO
-from pprs_dynamics.app.fleet.survey import SurveyJob, examine
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
@@ -23,7 +20,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import without_last_step
@@ -110,12 +107,14 @@ def test_what_lies_within_its_uncertainty_is_no_finding_and_beyond_it_is_one() -
 
 @pytest.mark.parametrize('true', [
     {'payload_mass': {'mass': 0.3}}, pytest.param(STRIBECK, marks=pytest.mark.slow),
-    pytest.param({'time_delay': {'lift_1.delay': 0.012}}, marks=pytest.mark.slow)], ids=list)
+    pytest.param({'time_delay': {'lift_1.delay': 0.006}}, marks=pytest.mark.slow)], ids=list)
 def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     true: Effects, tmp_path: Path,
 ) -> None:
     (name, truth), = true.items()
-    first = record(with_effects(MODEL, true), NOISE)
+    # Samples and noise alone decide how well a delay is known: here 6 ms to 13 % otherwise.
+    noise = NOISE / 2 if name == 'time_delay' else NOISE
+    first = record(with_effects(MODEL, true), noise)
     adoption = adopt(MODEL, EffectRequest(CATALOGUE[name]), [first])
     assert adoption.adopted
     model = booked(adoption, first)
@@ -127,7 +126,7 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
         assert 0 < read.values[f'uncertainties.{name}.{key}'] < 0.1 * truth[key]
     old = DriveModel.from_parameters({key: value for key, value in read.values.items()
                        if not key.startswith('uncertainties.')})
-    other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3).motion)
+    other = record(with_effects(MODEL, true), noise, seed=1, motion=Excitation(seed=3).motion)
     for given in (read, old):
         for recording in (first, other):
             found = diagnose(given, [recording])
@@ -168,13 +167,6 @@ def test_adopt_takes_out_what_nothing_is_left_of() -> None:
                 and key.startswith(('effects.', 'uncertainties.'))]
 
 
-def test_an_effect_of_the_model_that_holds_is_not_set_anew() -> None:
-    model = with_effects(MODEL, STRIBECK)
-    adoption = adopt(model, EffectRequest(CATALOGUE['stribeck_friction']), [record(model, NOISE)])
-    assert not adoption.adopted
-    assert 'is in the model already' in adoption.reason
-
-
 @pytest.mark.parametrize(('key', 'value', 'rule'), [
     ('uncertainties.payload_mas.mass', 0.1, 'unknown key'),
     ('uncertainties.payload_mass.mas', 0.1, 'belong to effects.payload_mass.mas'),
@@ -184,20 +176,3 @@ def test_an_uncertainty_of_nothing_is_refused(key: str, value: float, rule: str)
     with pytest.raises(ModelError, match=rule):
         DriveModel.from_parameters(
             {**with_effects(MODEL, {'payload_mass': {'mass': 0.3}}).values, key: value})
-
-
-@pytest.mark.parametrize('options', [AUTO])
-def test_a_survey_follows_what_the_model_has(options: str, tmp_path: Path) -> None:
-    """What the recording says of it, found otherwise or not: neither a difference nor nothing."""
-    model = with_effects(MODEL, {**STRIBECK, 'payload_mass': {'mass': 0.2}},
-                         {'payload_mass': {'mass': 0.05}})
-    true = {**STRIBECK, 'payload_mass': {'mass': 0.22}}
-    path = tmp_path / 'run.csv'
-    write_recording(path, record(with_effects(MODEL, true), NOISE))
-    write_model(tmp_path / 'model.yaml', model.values, None)
-    job = SurveyJob(SurveyedRecording(str(path), 'robot'), str(tmp_path / 'model.yaml'), options)
-    found = {(row['drive'], row['effect'], row['parameter']): row
-             for row in examine(job) if row.get('effect')}
-    mass = found[None, 'payload_mass', 'mass']
-    assert abs(mass['value'] - 0.22) < 4 * mass['std'] < 0.02
-    assert found['lift_1', 'stribeck_friction', 'force']['value'] == pytest.approx(0.6, abs=0.1)

@@ -95,11 +95,3 @@ def test_a_clearance_that_the_second_encoder_tells_is_lost_motion(
     assert number is not None
     assert float(number[1]) == pytest.approx(2e-4, rel=0.15)
     assert number[2] == of
-
-
-def test_without_a_second_encoder_it_is_told_by_the_load(tmp_path: Path) -> None:
-    model = made_up_arm.real_arm(tmp_path)
-    found = diagnose(model, [wound_up(model, COMPLIANCE, second=False)])
-    assert found.effects[0].name == 'elastic_joint'
-    told = found.effects[0].parameters['swing.compliance']
-    assert told.value == pytest.approx(COMPLIANCE, rel=0.15)

@@ -11,7 +11,7 @@ import scipy.signal
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 
 
@@ -110,13 +110,6 @@ def residuals_of(error: np.ndarray) -> Residuals:
                      np.zeros(samples, dtype=int), error, np.zeros_like(error), {}, {}, 0.01)
 
 
-def test_errors_are_roots_of_mean_squares_of_what_was_measured() -> None:
-    error = np.array([[3.0, np.nan, np.nan], [4.0, 5.0, np.nan]])
-    assert rms(residuals_of(error)) == pytest.approx((50 / 3) ** 0.5)
-    by_drive = rms_by_drive(residuals_of(error))
-    assert by_drive == pytest.approx({'drive_0': 12.5 ** 0.5, 'drive_1': 5.0})
-
-
 def test_a_block_gains_what_an_error_in_it_loses_over_the_noise() -> None:
     rng = np.random.default_rng(1)
     noise = 0.05 * rng.normal(size=(2000, 3))
@@ -134,11 +127,3 @@ def test_a_block_gains_what_an_error_in_it_loses_over_the_noise() -> None:
     assert np.abs(others).max() < 0.02 * expected
     assert not np.any(found.gains[:, [0, 2]])
     assert found.by_drive['drive_0'] == found.by_drive['drive_2'] == 0
-
-
-@pytest.mark.parametrize('samples', [99, 100])
-def test_a_drive_counts_from_a_hundred_samples_on(samples: int) -> None:
-    error = np.full((2000, 1), np.nan)
-    error[:samples] = np.random.default_rng(2).normal(size=(samples, 1))
-    found = predictive_gain(residuals_of(error), residuals_of(0.5 * error))
-    assert bool(found.gains.sum() > 0) is (samples == 100)

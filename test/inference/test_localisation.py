@@ -42,29 +42,6 @@ def test_a_planted_error_is_named_first_with_its_drive_and_variable(name: str) -
     assert benchmark.misses(name, 0.9, seed) == ''
 
 
-def test_a_range_and_its_shares_are_those_of_the_error_in_it() -> None:
-    recording = noisy(FIRST_SEED + 200)
-    v = recording.variables['velocity'][:, 4]
-    measured = recording.measured.copy()
-    measured[np.abs(v) < 0.01, 4] += 0.4
-    recording = replace(recording, measured=measured)
-    first = localise(recording).statements[0]
-    assert (first.drive, first.variable) == ('lift_2', 'velocity')
-    assert first.range is not None
-    # Samples lie a few mm/s apart where the drive accelerates.
-    assert first.range == pytest.approx((-0.01, 0.01), abs=0.003)
-    inside = (v >= first.range[0]) & (v <= first.range[1])
-    error = recording.error[:, 4]
-    assert first.share_of_error == pytest.approx(
-        float((error[inside] ** 2).sum() / (error ** 2).sum()), rel=0.02)
-    assert first.share_of_time == pytest.approx(float(inside.mean()), abs=0.005)
-    assert np.sqrt(first.mean_square / inside.mean()) == pytest.approx(0.4, abs=0.05)
-    assert first.text.startswith('lift_2: ')
-    assert 'mm/s' in first.text
-    assert set(first.to_dict()) == {'drive', 'variable', 'range', 'share_of_error',
-                                    'share_of_time', 'text'}
-
-
 def test_missing_samples_and_segments_do_not_hide_an_error_nor_make_one() -> None:
     clean = noisy(FIRST_SEED + 202)
     rng = np.random.default_rng(5)

@@ -14,7 +14,6 @@ from made_up_recordings import the_one
 from pprs_dynamics import DriveModel, JointMotion, Recording, compare, diagnose
 from pprs_dynamics.inference.residuals.long_recordings import (
     MOST_BLOCKS,
-    MOST_WHOLE,
     STRETCHES,
     excerpts_within_memory,
 )
@@ -47,13 +46,6 @@ def record(model: DriveModel, duration: float, moves_in: slice = slice(0, 60)) -
                                  ('axis',))
 
 
-def test_what_is_short_stays_as_it_is() -> None:
-    model = axis()
-    for recordings in ([record(model, 0.99 * MOST_WHOLE / RATE)], [record(model, 20.0)] * 3):
-        assert all(one is other for one, other in zip(
-            excerpts_within_memory(model, recordings), recordings, strict=True))
-
-
 def test_of_an_hour_stretches_from_all_over_it_are_taken_and_told() -> None:
     model, whole = axis(), record(axis(), 3600.0)
     found, = excerpts_within_memory(model, [whole])
@@ -74,16 +66,6 @@ def test_where_a_robot_stands_most_of_the_time_stretches_are_where_it_moves() ->
     found, = excerpts_within_memory(axis(), [whole])
     minute = np.concatenate([whole.time[part] for part in found.segments]) % 60
     assert np.mean((minute >= 20) & (minute < 35)) > 0.7
-
-
-def test_segments_are_never_bridged() -> None:
-    whole = record(axis(), 1200.0)
-    kept = np.flatnonzero(whole.time % 10 < 8)
-    gapped = Recording.from_arrays('gaps', whole.time[kept], whole.position[kept], None,
-                                   whole.effort[kept], ('axis',))
-    found, = excerpts_within_memory(axis(), [gapped])
-    for part in found.segments:
-        assert any(one.start <= part.start and part.stop <= one.stop for one in gapped.segments)
 
 
 def test_an_hour_is_diagnosed_from_excerpts_and_compared_as_a_whole() -> None:

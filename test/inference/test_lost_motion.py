@@ -68,13 +68,6 @@ def test_behind_a_play_is_the_link(play: float) -> None:
     assert np.abs(after).max() < 0.25 * np.abs(before).max()
 
 
-def test_motion_within_a_play_and_without_a_reversal_is_as_read() -> None:
-    ramp = 0.1 * TIME
-    np.testing.assert_array_equal(behind_play(ramp, 0.02), ramp)
-    shaken = 0.004 * np.sin(3 * TIME)
-    np.testing.assert_array_equal(behind_play(shaken, 0.02), shaken)
-
-
 def test_loads_choose_the_flank() -> None:
     effect = LostMotion({'lift_1': {'backlash': 0.004, 'play': 0.01}})
     load = np.array([[5.0, -30.0], [5.0, 10.0]])

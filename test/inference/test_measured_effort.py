@@ -18,6 +18,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 from shared_cases import shared_case
+from single_axis import axis, axis_motion
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
@@ -89,17 +90,10 @@ def platform_run() -> Run:
 
 
 def axis_run(gravity: float) -> Run:
-    given = DriveModel.load('config/single_axis.yaml').values
-    model = DriveModel.from_parameters({**given, 'robot.gravity': [0.0, 0.0, gravity]})
-    time = np.arange(0, DURATION, 1 / RATE)
-    q = np.zeros((3, len(time), 1))
-    for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
-        w = 2 * np.pi * rate
-        for k, part in enumerate((np.sin(w * time), w * np.cos(w * time),
-                                  -w * w * np.sin(w * time))):
-            q[k, :, 0] += size * part
-    rest = np.zeros_like(q[0])
-    return run_of(model, JointMotion(*q, time), JointMotion(q[0], rest, rest, time))
+    moved = axis_motion(np.arange(0, DURATION, 1 / RATE))
+    rest = np.zeros_like(moved.velocity)
+    return run_of(axis(**{'robot.gravity': (0.0, 0.0, gravity)}), moved,
+                  JointMotion(moved.position, rest, rest, moved.time))
 
 
 MACHINES = {'arm': mechanism_run, 'platform': lambda folder: platform_run(),

@@ -12,7 +12,6 @@ import pytest
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
-from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
@@ -179,19 +178,6 @@ def test_the_noise_is_that_of_the_samples_that_were_measured(every: int) -> None
     floors = [regression.noise_floor(fit, d) for d in regression.drives]
     # 17 000 samples: half a per cent. Bridged samples that count made it 0.93.
     assert np.mean(floors) == pytest.approx(1.0, abs=0.02)
-
-
-@pytest.mark.parametrize(('settings', 'most'), [
-    (NoiseSettings(white=0.08, coloured=0.0), 0.0),
-    (NoiseSettings(white=0.04, coloured=0.07, correlation=0.999), 0.04),
-    (NoiseSettings(white=0.0, coloured=0.0, pink=0.08), 0.12)])
-def test_a_constant_of_noise_seldom_stands_out(settings: NoiseSettings, most: float) -> None:
-    beyond = []
-    for seed in range(8):
-        noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
-        _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
-        beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
-    assert np.mean(beyond) <= most
 
 
 def test_a_drive_without_any_noise_has_finite_noise() -> None:

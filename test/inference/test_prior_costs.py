@@ -62,3 +62,14 @@ def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> No
 def test_all_changes_of_a_kind_share_the_odds_of_a_change(kind: str, count: int) -> None:
     cost = COSTS.of_course(Course(kind, 1.0, 2.0))
     assert count * np.exp(-cost / 2) == pytest.approx(DECISIONS.onset_odds)
+
+
+def test_asymmetric_friction_claims_dry_and_viscous_friction_apart() -> None:
+    effect = CATALOGUE['asymmetric_friction']
+    dry, viscous = (effect.hypotheses((name,)) for name in ('force_forward', 'viscous_backward'))
+    assert len(dry) == len(viscous) == 1
+    assert effect.hypotheses(('force_forward', 'force_backward')) == dry
+    assert effect.hypotheses(('force_backward', 'viscous_forward')) == dry | viscous
+    # What claims one thing only claims as many as it has sets of coefficients.
+    spring = CATALOGUE['hysteresis']
+    assert len(spring.hypotheses(('force',)) | spring.hypotheses(('coefficient',))) == 2

@@ -198,16 +198,6 @@ def test_effects_with_memory_run_through_a_segment_and_start_afresh_in_the_next(
     assert np.abs(treated).max() > 0.5
 
 
-@pytest.mark.parametrize('samples', [10, 30, 60])
-def test_a_recording_that_is_too_short_is_refused_in_a_sentence(samples):
-    real = truth()
-    recording = Recording(Recording.from_arrays('', real.time, real.drives.position).drives,
-                          real.time[:samples], real.drives.position[:samples], None,
-                          real.force[:samples], name='short', segments=(slice(0, samples),))
-    with pytest.raises(MotionError, match=rf'{samples} samples'):
-        reconstruct(MODEL, recording, window=0.2)
-
-
 def test_a_single_axis_is_smoothed_but_has_no_platform():
     real = truth()
     recording = Recording.from_arrays(

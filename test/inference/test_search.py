@@ -112,15 +112,6 @@ def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
                for found in table.barred(DECISIONS.rival_margin))
 
 
-def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
-    found = tabulate(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
-                   DECISIONS)
-    assert names(found.best.fitted) == ['viscous_friction']
-    assert 'asymmetric_friction' not in {
-        name for rival in found.rivals(1e6) for name in rival.instead
-        if names(rival.row.fitted) == ['asymmetric_friction']}
-
-
 def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
     recording = recording_of({}, 0.05)
     effort = recording.effort.copy()

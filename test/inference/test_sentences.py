@@ -149,15 +149,6 @@ def test_commands_say_whose_robot_the_model_is() -> None:
             f'pprs diagnose RECORDING {words}')
 
 
-def test_a_rival_of_one_of_two_effects_reads_as_in_its_place() -> None:
-    two = made_up_diagnosis(
-        'ambiguous', effects=(found_effect('coulomb_friction'), found_effect('time_delay')),
-        indistinguishable=(('coulomb_friction', 'friction_drift'),))
-    headline = word_diagnosis(two).headline
-    assert re.search(r'coulomb_friction on \w+ \([^)]*, or friction_drift in its place: the data '
-                     r'do not separate these\) and time_delay', headline), headline
-
-
 def test_the_page_escapes_what_comes_from_files() -> None:
     words = word_diagnosis(everything())
     html = diagnosis_page(everything(), words, made_up_residuals(), ['<script>alert(1)</script>'],

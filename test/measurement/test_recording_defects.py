@@ -98,15 +98,6 @@ def test_any_disorder_within_reach_is_undone(seed: int, reach: int) -> None:
     assert recording.segments == (slice(0, 200),)
 
 
-def test_shuffled_rows_are_sorted() -> None:
-    arrays = measured()
-    order = np.random.default_rng(0).permutation(1000)
-    recording = judged({name: values[order] for name, values in arrays.items()})
-    assert_same(recording, arrays)
-    assert kinds(recording) == {'unordered_stamps'}
-    assert recording.segments == (slice(0, 1000),)
-
-
 @pytest.mark.parametrize('back', [0.2, 2.0, 1.7e9])
 def test_a_clock_that_is_set_back_splits(back: float) -> None:
     arrays = measured()
@@ -177,14 +168,6 @@ def test_a_rate_that_changes_is_one_motion_with_irregular_steps(factor: float) -
     steps = np.full(1000, STEP)
     steps[450:] *= factor
     arrays['time'] = np.cumsum(steps)
-    recording = judged(arrays)
-    the(recording, 'irregular_steps')
-    assert recording.segments == (slice(0, 1000),)
-
-
-def test_no_sample_of_an_irregular_clock_is_called_lost() -> None:
-    arrays = measured()
-    arrays['time'] = np.cumsum(np.random.default_rng(0).lognormal(np.log(STEP), 0.5, 1000))
     recording = judged(arrays)
     the(recording, 'irregular_steps')
     assert recording.segments == (slice(0, 1000),)
@@ -365,14 +348,6 @@ def test_segments_too_short_to_filter_are_not_used() -> None:
     np.testing.assert_allclose(finding.spans, [(1.2, 1.236)])
     assert recording.segments == (slice(0, 100), slice(119, 1000))
     assert len(recording.time) == 1000
-
-
-def test_a_short_recording_is_told_and_kept() -> None:
-    assert the(judged(measured(99)), 'too_short').count == 1
-    recording = judged(measured(5))
-    assert kinds(recording) >= {'short_segment', 'too_short'}
-    assert recording.segments == ()
-    assert len(recording.time) == 5
 
 
 @settings(max_examples=60)

@@ -80,21 +80,6 @@ def test_every_writer_gives_the_same_arrays_and_nothing_to_tell(
     assert recording.drives == DRIVES
 
 
-@pytest.mark.parametrize('suffix', SUFFIXES)
-def test_efforts_that_were_not_measured_and_absent_velocities_survive_a_round_trip(
-    suffix: str, tmp_path: Path,
-) -> None:
-    arrays = {**measured(600), 'velocity': None}
-    arrays['effort'][50:60, 2] = np.nan
-    path = by_own_writer(suffix)(tmp_path, arrays)
-    recording = read_recording(path)
-    assert_same(recording, arrays)
-    assert kinds(recording) == {'effort_not_measured', 'missing_velocity'}
-    (tmp_path / 'again').mkdir()
-    again = by_own_writer(suffix)(tmp_path / 'again', arrays)
-    assert_same(read_recording(again), arrays)
-
-
 @pytest.mark.parametrize('suffix', ['.mcap', '.db3', ''])
 def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
     suffix: str, tmp_path: Path,

@@ -7,9 +7,44 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sticking_block import STEP, TIME, dragged, slow
+from single_axis import axis_values
 
+from pprs_dynamics import DriveModel, Recording
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.motion.stick_slip import find_stick_slip
+
+STEP = 0.01  # [s]
+TIME = np.arange(0, 30, STEP)
+
+
+def dragged(asked: Array, stiffness: float = 40.0, static: float = 1.2, sliding: float = 0.6,
+            mass: float = 0.02) -> tuple[Array, Array]:
+    """Return position and effort of a block dragged by a spring over friction that falls.
+
+    Integrated in steps of 0.1 ms: it stands while the spring pulls less than `static`.
+    """
+    h, substeps = STEP / 100, 100
+    q, v, found = asked[0], 0.0, np.empty((len(asked), 2))
+    target = np.interp(np.arange(len(asked) * substeps) / substeps, np.arange(len(asked)), asked)
+    for k in range(len(asked)):
+        for goal in target[k * substeps:(k + 1) * substeps]:
+            pull = stiffness * (goal - q) - 0.4 * v
+            if v == 0.0 and abs(pull) <= static:
+                continue
+            way = np.sign(v) if v else np.sign(pull)
+            after = v + h * (pull - sliding * way) / mass
+            v = 0.0 if v * after < 0 else after
+            q += h * v
+        found[k] = q, stiffness * (asked[k] - q)
+    return found[:, 0], found[:, 1]
+
+
+def slow(speed: float = 0.06) -> Array:
+    """Return a slow way there and back."""
+    return np.where(TIME < 15, speed * TIME, speed * (30 - TIME))
 
 
 def test_a_block_on_a_spring_sticks_and_slips() -> None:
@@ -58,3 +93,14 @@ def test_a_speed_that_goes_up_and_down_does_not(depth: float) -> None:
     velocity = np.gradient(position, STEP)
     effort = 0.5 * np.tanh(velocity / 0.005) + 3 * np.gradient(velocity, STEP)
     assert find_stick_slip(TIME, position, effort) is None
+
+
+def test_a_diagnosis_names_it_with_its_frequency_and_claims_nothing_else() -> None:
+    position, effort = dragged(slow())
+    effort = effort + 0.005 * np.random.default_rng(4).normal(size=len(TIME))
+    found = diagnose(DriveModel.from_parameters(axis_values(0.02, 0.4, 0.6)), [
+        Recording.from_arrays('run', TIME, position[:, None], None, effort[:, None], ('axis',))])
+    assert (found.verdict, found.effects) == ('unknown', ())
+    assert found.to_dict()['stick_slip']['axis']['frequency'] == pytest.approx(2.3, abs=0.1)
+    assert 'Stick-slip on axis at 2.3' in word_diagnosis(found).headline
+    assert 'faster' in next_step(found, PLACEHOLDERS)[0]

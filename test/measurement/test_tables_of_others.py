@@ -131,12 +131,6 @@ def as_mat(folder: Path) -> tuple[Path, str, str, str]:
     return folder / 'run.mat', 'rec.t', 'rec.act.pos', 'rec.act.trq'
 
 
-def as_struct_array(folder: Path) -> tuple[Path, str, str, str]:
-    other = {'t': TIME[:9], 'q': POSITION[:9], 'tau': EFFORT[:9]}
-    savemat(folder / 'run.mat', {'runs': [other, {'t': TIME, 'q': POSITION, 'tau': EFFORT}]})
-    return folder / 'run.mat', 'runs[1].t', 'runs[1].q', 'runs[1].tau'
-
-
 def as_numpy(folder: Path) -> tuple[Path, str, str, str]:
     # As TimeSeries of mujoco.sysid saves itself: positions and efforts would be two of them.
     np.savez(folder / 'run.npz', times=TIME, data=POSITION, tau=EFFORT)
@@ -149,7 +143,7 @@ def as_parquet(folder: Path) -> tuple[Path, str, str, str]:
     return folder / 'run.parquet', 'timestamp', 'observation.state', 'observation.effort'
 
 
-@pytest.mark.parametrize('write', [as_mat, as_struct_array, as_numpy, as_parquet])
+@pytest.mark.parametrize('write', [as_mat, as_numpy, as_parquet])
 def test_elements_of_lists_and_fields_of_structures_are_columns(
     write: Callable[[Path], tuple[Path, str, str, str]], tmp_path: Path,
 ) -> None:

@@ -68,17 +68,8 @@ def test_compiled_equals_plain(plainly, variant, elbow):
     compiled, plain = everything(model, motion), plainly(lambda: everything(model, motion))
     for name, values in compiled.items():
         assert_allclose(values, plain[name], rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
-
-
-@pytest.mark.parametrize('variant', VARIANTS)
-def test_one_pass_equals_the_steps_that_are_kept(variant):
-    rng = np.random.default_rng(7)
-    model = model_of(random_robot(rng, gravity=(1.0, -2.0, -9.0)), VARIANTS[variant])
-    motion = random_motion(rng, SAMPLES)
-    in_one, in_steps = model.drive_forces(motion), model.forces_at(model.mechanism(motion))
-    assert list(in_one.parts) == list(in_steps.parts)
-    for name, part in in_steps.parts.items():
-        assert_allclose(in_one.parts[name], part, rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
+    # One pass gives what the steps give that are kept.
+    assert_allclose(compiled['total'], compiled['in steps'], rtol=AGREEMENT, atol=AGREEMENT)
 
 
 def test_forces_are_copied_and_pickled_with_their_mechanism():

@@ -137,19 +137,6 @@ def test_without_loops_a_joint_without_a_drive_is_locked_within_its_limits(
     assert model.robot.structure.locked == {'slide': at}
 
 
-@pytest.mark.parametrize(('locked', 'words'), [
-    ('{leader: 9.0}', r'robot\.locked\.leader is 9\.0, must be within its limits, -3 to 3'),
-    ('{leeder: 0.0}', r'unknown joint leeder'),
-    ('{j1: 0.0}', r'robot\.drives has j1 as well')])
-def test_a_lock_that_cannot_be_is_refused(
-    tmp_path: Path, locked: str, words: str,
-) -> None:
-    with pytest.raises(PprsError, match=words):
-        load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
-             + joint('leader', 'l1', 'l2', '1 0 1') + link('l2'),
-             f'robot: {{base: base, tool: l2, drives: [j1], locked: {locked}}}')
-
-
 @pytest.mark.parametrize('base', ['world', 'plate'])
 @pytest.mark.parametrize('angle', ['3.141592653589793 0 0', '0.4 1.2 0.3'])
 def test_gravity_is_in_the_frame_of_the_root(tmp_path: Path, base: str, angle: str) -> None:

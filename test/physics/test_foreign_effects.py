@@ -69,16 +69,6 @@ def test_an_effect_on_the_bodies_acts_on_a_robot_with_loops_as_well(package: Mod
     assert np.max(np.abs(ours.parts['hose'])) > 0.1
 
 
-def test_a_failing_effect_on_the_bodies_of_a_robot_with_loops_is_one_error(
-    package: ModuleType,
-) -> None:
-    model = hexapod_with('hose', force=2.0)
-    fail(package, 'load', 'longer')
-    rest = np.zeros((1, 6))
-    with pytest.raises(EffectError, match=r'effect hose: .* must be \(1, 6\)'):
-        model.drive_forces(JointMotion(rest + 0.48, rest, rest))
-
-
 @pytest.mark.parametrize(('fault', 'told'), LOADED.items())
 def test_wrong_columns_are_found_when_the_package_is_loaded(
     package: ModuleType, fault: str, told: str,

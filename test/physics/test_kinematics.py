@@ -27,7 +27,6 @@ from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import (
     ConvergenceError,
     MotionError,
-    PprsError,
     SingularityError,
     WorkspaceError,
 )
@@ -54,11 +53,6 @@ def home_pose():
 def forward(geometry, q):
     """Return poses of drive positions."""
     return replace(paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
-
-
-def rotation_vector(motion):
-    """Return the rotation vector of a motion's first sample."""
-    return Rotation.from_quat(motion.orientation[0]).as_rotvec()
 
 
 def solve(geometry, motion):
@@ -138,16 +132,6 @@ def test_drives_that_cannot_close_the_mechanism_raise(geometry):
 def test_drive_positions_that_are_none_raise(q):
     with pytest.raises(MotionError, match='drive positions'):
         paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
-
-
-def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():
-    # Platform joints a quarter turn on: det [B] = 0 at home, so its sign there is rounding.
-    quarter = tuple(np.asarray(paper_geometry().platform_angles) + np.pi / 2)
-    geometry = replace(paper_geometry(), platform_angles=quarter)
-    poses = PlatformMotion.at_rest(*random_poses(np.random.default_rng(10), 1))
-    q = inverse_kinematics(geometry, poses).position
-    with pytest.raises(PprsError, match='home'):
-        forward(geometry, q)
 
 
 def yaw_with_share(geometry, share):

@@ -136,22 +136,6 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: st
         DriveModel.load(path)
 
 
-def test_effects_say_where_they_act(tmp_path: Path) -> None:
-    path = arm.write_arm(tmp_path)
-    text = path.read_text() + '    effects:\n'
-    path.write_text(text + '      payload_offset: {x: 0.1, y: 0.0, z: 0.0}\n')
-    with pytest.raises(ModelError, match='acts in a serial arm'):
-        DriveModel.load(path)
-    path.write_text(text + '      rod_mass: {mass: 0.1}\n')
-    with pytest.raises(ModelError, match='unknown effect rod_mass'):
-        DriveModel.load(path)
-    with pytest.raises(ModelError, match='acts in a 3-PPRS'):
-        DriveModel.from_parameters(
-            {**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
-    with pytest.raises(ModelError, match=r'unknown key effects\.link_mass\.beam\.mass'):
-        DriveModel.from_parameters({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
-
-
 def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path)
     (tmp_path / 'there').mkdir()

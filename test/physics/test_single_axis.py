@@ -14,9 +14,8 @@ from pprs_command import pprs
 from single_axis import AXIS, TIME, axis, axis_motion, axis_recording
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.errors import ModelError, MotionError
-from pprs_dynamics.inference.residuals.reconstruction import reconstruct
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.physics.model.model_writer import write_model
 
 VALUES = dict(axis().values)
@@ -56,13 +55,6 @@ def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence:
     with pytest.raises(ModelError) as caught:
         DriveModel.from_parameters({**VALUES, **change})
     assert sentence in str(caught.value)
-
-
-def test_a_recording_of_other_drives_is_refused_by_name() -> None:
-    time = np.arange(0.0, 5.0, 0.01)
-    other = Recording.from_arrays('x', time, np.sin(time)[:, None], drives=('lift_1',))
-    with pytest.raises(MotionError, match='they are lift_1, must be axis'):
-        reconstruct(DriveModel.from_parameters(VALUES), other)
 
 
 def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder: Path) -> None:

@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import made_up_arm
 import numpy as np
 import pytest
 
@@ -44,20 +41,6 @@ def test_a_hexapods_legs_are_as_long_as_its_drives_say() -> None:
     mixed = corners[[0, 2, 4, 1, 3, 5]]
     assert len(corners) == 6
     assert around < np.linalg.norm(mixed - np.roll(mixed, 1, axis=0), axis=1).sum()
-
-
-@pytest.mark.parametrize('name', ['delta', 'arm'])
-def test_links_keep_their_lengths(name: str, tmp_path: Path) -> None:
-    model = (DriveModel.load('config/delta.yaml') if name == 'delta' else
-             DriveModel.load(made_up_arm.write_arm(tmp_path)))
-    drawn = Skeleton.of(model, about_home(model))
-    # Joints of the arm that stand in one point have one line between them.
-    assert {line.drive for line in drawn.lines} >= ({0, 1, 2} if name == 'delta' else {0, 2})
-    slides = {d for d, unit in enumerate(model.units) if not unit.turns}
-    for line in drawn.lines:
-        if line.drive not in slides:
-            length = np.linalg.norm(drawn.points[:, line.start] - drawn.points[:, line.end], axis=1)
-            assert np.ptp(length) < 1e-9, line
 
 
 def test_the_3_pprs_is_drawn_by_its_chains() -> None:

@@ -19,13 +19,12 @@ from random_states import (
     random_motion,
     random_poses,
     random_robot,
-    smooth_motion,
 )
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.state import PLATFORM
 
 EFFECTS = {name: paper_model().bound(effect) for name, effect in CATALOGUE.items()
@@ -199,17 +198,6 @@ def test_dry_friction_of_joints_takes_its_torque_times_their_speed(elbow) -> Non
         assert_allclose(np.sum(force * state.velocity, axis=1), expected, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize('changes', [
-    {'equations': 'printed'}, {'friction.approach': 'independent_chains'}])
-def test_friction_added_in_joints_is_exact_whatever_the_papers_is(changes) -> None:
-    motion = smooth_motion(np.linspace(0, 3, 20))
-    states = [paper_model(more).mechanism(motion) for more in ({}, changes)]
-    for joint in ('revolute', 'spherical'):
-        effect = EFFECTS['joint_friction']({f'{joint}.viscous': 0.03, f'{joint}.torque': 0.02})
-        exact, other = (effect.force(state) for state in states)
-        assert_allclose(other, exact, rtol=0, atol=1e-12)
-
-
 # What holds for all of them ------------------------------------------------------------------
 
 
@@ -240,28 +228,6 @@ def test_an_effect_comes_back_from_its_file_and_from_its_coefficients(name) -> N
     assert effect.from_coefficients(coefficients) == pytest.approx(VALUES[name], rel=1e-14)
     again = effect.at(coefficients)
     assert effect.from_file(again.values).values == pytest.approx(VALUES[name], rel=1e-14)
-
-
-@every_effect
-def test_the_body_with_an_effect_is_a_robot_of_its_own(case, name) -> None:
-    robot, motion, state = case
-    if not issubclass(EFFECTS[name], BodyEffect):
-        return
-    effect, masses = EFFECTS[name](VALUES[name]), state.robot.masses
-    kept = dict(vars(masses))
-    applied = effect.apply(state)
-    assert vars(masses) == kept
-    assert state.robot.masses is masses
-    # Guide loads change with it: the friction that follows loads does, too.
-    assert np.abs(applied.friction_load - state.friction_load).max() > 1e-3
-    if name in ('base_tilt', 'link_mass', 'payload_mass', 'payload_offset', 'platform_inertia'):
-        fresh = model_of(robot_of(effect.changed(robot))).mechanism(motion)
-        assert_allclose(applied.friction_load, fresh.friction_load, rtol=0, atol=FORCE_TOLERANCE)
-
-
-def robot_of(robot):
-    """Return the robot with its masses made anew, which checks them."""
-    return replace(robot, masses=replace(robot.masses))
 
 
 @pytest.mark.parametrize(('name', 'values', 'rule'), [

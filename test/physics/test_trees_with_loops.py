@@ -51,16 +51,6 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
     assert np.max(np.abs(found - expected)) < 1e-9 * np.max(np.abs(expected))
 
 
-@pytest.mark.parametrize('name', ['hexapod', 'delta'])
-def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
-    model = DriveModel.load(ROBOTS[name]().write(tmp_path))
-    motion = states(model, SIZES[name])
-    rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
-    total = model.drive_forces(motion).total
-    assert rows @ model.robot.inertial.ravel() == pytest.approx(
-        total, abs=1e-11 * np.max(np.abs(total)))
-
-
 @pytest.mark.parametrize('name', ['hexapod', 'five_bar'])
 def test_python_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                                monkeypatch: pytest.MonkeyPatch) -> None:

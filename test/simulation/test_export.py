@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import made_up_arm as arm
 import mujoco
 import numpy as np
 import pinocchio
@@ -173,29 +172,6 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     if kind == URDF:
         assert {'ball_1', 'ball_2'} & {each[:6] for each in result['not_expressed']}
         assert pinocchio.buildModelFromUrdf(str(file)).nv > 12
-
-
-def test_an_arm_in_another_library(tmp_path: Path) -> None:
-    path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
-                         friction__coulomb=[6.0, 4.0, 9.0])
-    model = DriveModel.load(path)
-    file, result = exported(path, URDF, tmp_path)
-    assert result['not_expressed'] == []
-    assert without_loads(model, URDF) < 1e-9
-    motion = draw_motion(model, 5.0, 2)
-    expected = model.drive_forces(motion).parts['rigid_body']
-    other = pinocchio.buildModelFromUrdf(str(file))
-    other.gravity.linear = np.array([0.0, 0.0, -9.81])
-    data = other.createData()
-    order = [other.joints[other.getJointId(name)].idx_v for name in model.drives]
-    found = np.empty_like(expected)
-    for k in range(len(motion)):
-        q, v, a = (np.zeros(3) for _ in range(3))
-        q[order], v[order], a[order] = (motion.position[k], motion.velocity[k],
-                                        motion.acceleration[k])
-        found[k] = pinocchio.rnea(other, data, q, v, a)[order]
-    assert found == pytest.approx(expected, abs=EXACT * np.abs(expected).max())
-    assert other.existFrame('flange')
 
 
 @pytest.mark.parametrize('kind', [MJCF, URDF])

@@ -56,14 +56,6 @@ def test_the_engine_moves_the_bodies_of_the_model(model: DriveModel) -> None:
         - np.array(model.values['robot.armature']) * motion.acceleration, abs=1e-8)
 
 
-def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None:
-    arm.write_arm(tmp_path, joints=arm.JOINTS[:2])
-    standing = DriveModel.load(tmp_path / 'arm.yaml')
-    motion = draw_motion(standing, 10.0, 0)
-    assert MechanismEngine(standing).torques(motion) == pytest.approx(
-        standing.drive_forces(motion).parts['rigid_body'], abs=1e-8)
-
-
 def test_a_hidden_payload_is_a_point_at_the_tool(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = MechanismEngine(model)
@@ -95,9 +87,6 @@ def test_without_effects_the_model_leaves_noise(model: DriveModel) -> None:
 
 
 AXIS = DriveModel.load('config/single_axis.yaml')
-NOT_ON_AN_AXIS = ('counterbalance', 'link_mass', 'base_tilt', 'external_wrench',
-                  'eccentric_encoder', 'joint_friction', 'coupled_drives', 'payload_offset',
-                  'platform_inertia', 'payload_pick_up', 'joint_spring', 'tool_drag')
 
 
 def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> None:
@@ -108,26 +97,6 @@ def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> N
         values['links.mass'][0] * run.motion.acceleration + values['friction.viscous'][0] * v
         + values['friction.coulomb'][0] * np.tanh(v / width) + values['friction.offset'][0],
         abs=1e-8)
-
-
-@pytest.mark.parametrize('name', NAMES)
-def test_effects_are_injected_into_an_axis_or_refused(name: str) -> None:
-    if name in NOT_ON_AN_AXIS:
-        with pytest.raises(InjectedEffectError, match=name):
-            simulate_mechanism(AXIS, (name,), 4, duration=8.0)
-        return
-    plain, run = (simulate_mechanism(AXIS, names, 4, noise=0.0, duration=8.0)
-                  for names in ((), (name,)))
-    assert run.effects[0]['name'] == name
-    assert (np.abs(run.effort - plain.effort).max() > 0.1
-            or np.abs(run.position - plain.position).max() > 1e-3)
-
-
-@pytest.mark.parametrize('name', ['payload_offset', 'platform_inertia'])
-def test_what_acts_on_a_platform_is_not_injected_into_an_arm(model: DriveModel, name: str) -> None:
-    """The catalogue has it on a 3-PPRS alone: no diagnosis of an arm could name it."""
-    with pytest.raises(InjectedEffectError, match='choose payload_mass'):
-        simulate_mechanism(model, (name,), 4, duration=8.0)
 
 
 def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
@@ -244,6 +213,19 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
     noise = 0.005 * np.abs(run.efforts).max(axis=0)
     assert np.all(np.sqrt(np.mean((added - exact) ** 2, axis=0)) < 0.01 * noise)
     assert np.all(np.sqrt(np.mean(exact ** 2, axis=0)) > noise)
+
+
+def test_a_payload_of_a_3_pprs_is_at_the_centre_of_mass_of_platform_and_payload() -> None:
+    plain = plain_platform()
+    run = Injection(plain, [named('payload_mass', np.random.default_rng(1), 1.0)],
+                    np.random.default_rng(2))
+    heavier = DriveModel.from_parameters({
+        **PLATFORM.values, 'effects.active': ['payload_mass'],
+        'effects.payload_mass.mass': run.truths[0]['parameters']['mass']})
+    motion = Excitation(seed=3).motion(np.arange(300) / 100)
+    exact = heavier.drive_forces(motion).total - PLATFORM.drive_forces(motion).total
+    error = run.efforts - plain.effort - exact
+    assert np.all(error.std(axis=0) < 0.01 * exact.std(axis=0))
 
 
 def test_given_drives_have_the_effect() -> None:

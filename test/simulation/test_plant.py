@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,9 +13,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.simulation.drive_control import Setpoint
-from pprs_dynamics.simulation.injected_forms import InjectedEffectError, tilted
+from pprs_dynamics.simulation.injected_forms import InjectedEffectError
 from pprs_dynamics.simulation.injection import draw_motion
 from pprs_dynamics.simulation.plant import Plant
 from pprs_dynamics.simulation.platform import as_mechanism
@@ -112,29 +110,6 @@ def platform() -> DriveModel:
     return DriveModel.load('config/paper.yaml')
 
 
-def test_a_platform_without_friction_keeps_its_energy(platform: DriveModel) -> None:
-    zero = {key: np.multiply(value, 0.0).tolist() for key, value in platform.values.items()
-            if key.startswith('friction.') and key.endswith(('viscous', 'coulomb'))}
-    plant = Plant(DriveModel.from_parameters({**platform.values, **zero}), rate=2000.0)
-    plant.place(plant.position, np.array([0.1, -0.05, 0.08, 0.05, -0.04, 0.06]))
-    effort = plant.holding(plant.position)
-
-    def energies() -> np.ndarray:
-        engine, motion = plant.engine, plant.engine.loops.put(
-            plant.position, plant.velocity, 0 * plant.velocity)
-        plant.engine.carried(motion)
-        engine.engine.mj_energyPos(engine.model, engine.data)
-        v = motion.velocity[0]
-        return np.array([v @ engine.inertia() @ v / 2,
-                         engine.data.energy[0] - effort @ plant.position])
-
-    start = energies()
-    for _ in range(400):
-        plant.step(effort)
-    # The midpoint rule is of second order: 0.5 ms against motions of tenths of a second.
-    assert abs(energies().sum() - start.sum()) < 1e-4 * start[0]
-
-
 def test_effects_change_while_it_runs(platform: DriveModel) -> None:
     plant = Plant(platform, ['coulomb_friction:lift_1,lift_2'], seed=3)
     (first,) = plant.injected
@@ -146,14 +121,3 @@ def test_effects_change_while_it_runs(platform: DriveModel) -> None:
         plant.inject(['viscous'])
     with pytest.raises(InjectedEffectError, match="not act in 'lift_1'"):
         plant.inject(['base_tilt:lift_1'])
-
-
-@pytest.mark.parametrize('gravity', [[0.0, 0.0, -9.81], [0.0, 9.81, 0.0]])
-def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
-    tmp_path: Path, gravity: list[float],
-) -> None:
-    angle = 0.02
-    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
-    tilt = BaseTilt({'x': angle, 'y': 0.0})
-    robot = replace(model.robot, gravity=tuple(gravity))
-    assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)

@@ -42,11 +42,10 @@ export class Curves {
     root.addEventListener('keydown', (event) => this.key(event));
   }
 
-  /* Take every drive's times and error before, and its noise to be drawn; the error now follows. */
-  use(drives, times, segment, before, noise = null) {
+  /* Take the times and the error before of every drive; the error now follows. */
+  use(drives, time, segment, before) {
     this.drives = drives;
-    this.times = times;
-    this.noise = noise;
+    this.time = time;
     this.before = before.map((row) => cut(row, segment));
     this.segment = segment;
     this.now = this.before;
@@ -94,9 +93,9 @@ export class Curves {
       hooks: {
         setSelect: [(u) => this.select(u, d)],
         setCursor: [(u) => this.read(u, reading, drive)],
-        draw: [(u) => this.bands(u), (u) => this.levels(u, d), (u) => this.line(u)],
+        draw: [(u) => this.bands(u), (u) => this.line(u)],
       },
-    }, [this.times[d], this.before[d], this.now[d] || this.before[d]], place);
+    }, [this.time, this.before[d], this.now[d]], place);
     plot.over.addEventListener('mousedown', () => { this.source = plot; });
     plot.over.addEventListener('dblclick', () => this.all());
     plot.over.addEventListener('wheel', (event) => {
@@ -126,21 +125,20 @@ export class Curves {
   setNow(rows) {
     this.now = rows.map((row) => cut(row, this.segment));
     this.plots.forEach((plot, d) => {
-      plot.setData([this.times[d], this.before[d], this.now[d]], false);
+      plot.setData([this.time, this.before[d], this.now[d]], false);
       const [min, max] = this.range();
       plot.setScale('x', {min, max});
     });
   }
 
   range() {
-    return this.window || [Math.min(...this.times.map((time) => time[0])),
-                           Math.max(...this.times.map((time) => time[time.length - 1]))];
+    return this.window || [this.time[0], this.time[this.time.length - 1]];
   }
 
   /* What is drawn of each drive, whole; `range` says how much of it is seen. */
   seen() {
     return this.drives.map((drive, d) => ({
-      drive, unit: this.unitOf(drive), time: this.times[d], before: this.before[d],
+      drive, unit: this.unitOf(drive), time: this.time, before: this.before[d],
       now: this.now[d]}));
   }
 
@@ -221,21 +219,6 @@ export class Curves {
       const left = u.valToPos(from, 'x', true);
       u.ctx.fillRect(left, u.bbox.top, Math.max(u.valToPos(to, 'x', true) - left, 1.5),
                      u.bbox.height);
-    }
-    u.ctx.restore();
-  }
-
-  /* Two standard deviations of the noise. */
-  levels(u, d) {
-    if (!this.noise) return;
-    u.ctx.save();
-    u.ctx.strokeStyle = css('--noise');
-    u.ctx.setLineDash([2, 4]);
-    for (const level of [-2 * this.noise[d], 2 * this.noise[d]]) {
-      u.ctx.beginPath();
-      u.ctx.moveTo(u.bbox.left, u.valToPos(level, 'y', true));
-      u.ctx.lineTo(u.bbox.left + u.bbox.width, u.valToPos(level, 'y', true));
-      u.ctx.stroke();
     }
     u.ctx.restore();
   }

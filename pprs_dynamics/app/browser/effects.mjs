@@ -18,8 +18,8 @@ export const toSlider = (one, middle) => (one.value === null ? 0 : Math.round(10
   one.is_relative ? Math.log10(one.value / middle)
     : (one.value - middle) / Math.max(Math.abs(middle), one.scale))));
 
-/* Whether an effect is told to pay: beside a diagnosis, which knows how friction turns over and what
-   forms leave over, what it does not call for pays by a scan alone. */
+/* Whether the evidence supports an effect. Once there is a diagnosis, an effect that it does not
+   report is supported only if it is ticked: the scan ignores how friction reverses. */
 export const pays = (one) => one.evidence > 0
   && (one.is_ticked || one.is_called_for || !one.is_judged);
 
@@ -50,9 +50,8 @@ class EffectRow {
     this.release = button('Best values', () => actions.release(this.name));
     this.bar = make('div', '', 'bar');
     this.bar.append(this.adopt, this.release);
-    this.node.append(head, this.chips, this.parameters);
-    if (actions.adopt) this.node.append(this.bar);
-    if (effect.equation) this.addAbout(head, effect);
+    this.node.append(head, this.chips, this.parameters, this.bar);
+    this.addAbout(head, effect);
     this.fields = new Map();
   }
 
@@ -75,23 +74,23 @@ class EffectRow {
     this.title.replaceChildren(titleOf(effect.name));
     if (effect.nonlinear) {
       this.title.append(make('abbr', ' ≈', '', {
-        title: 'bends how others show: approximate until it is evaluated'}));
+        title: 'nonlinear: approximate until the model is evaluated'}));
     }
-    if (effect.is_called_for) this.title.append(' ', make('span', 'called for', 'badge'));
+    if (effect.is_called_for) this.title.append(' ', make('span', 'reported', 'badge'));
     this.evidence.textContent = plain(effect.evidence);
     this.evidence.title = EVIDENCE + (effect.evidence > 0 && !pays(effect)
-      ? '; by a scan: the diagnosis, which counts reversals and lack of fit, does not call for it'
+      ? '; a first estimate: the diagnosis does not report this effect'
       : '') + (effect.evidence_terms
-      ? `; what the cost has more without it: ${effect.evidence_terms}` : '');
+      ? `; rise of the cost without it: ${effect.evidence_terms}` : '');
     this.evidence.classList.toggle('pays', pays(effect));
     this.evidence.classList.toggle('pending', effect.evidence_is_pending);
     this.evidence.setAttribute('aria-label', `evidence ${this.evidence.textContent}${
       effect.evidence_is_pending ? ', pending' : ''}`);
     this.bar.hidden = this.chips.hidden = this.parameters.hidden = !effect.is_ticked;
     if (!effect.is_ticked) return;
-    this.adopt.disabled = Boolean(state.jobs?.adopt?.is_running);
+    this.adopt.disabled = Boolean(state.jobs.adopt?.is_running);
     this.release.hidden = !effect.parameters.some((one) => one.is_chosen);
-    if (effect.is_on_drives) this.showDrives(effect.drives ?? [], effect.places ?? state.drives);
+    if (effect.is_on_drives) this.showDrives(effect.drives ?? [], state.drives);
     this.showParameters(effect.parameters);
   }
 
@@ -169,8 +168,8 @@ class EffectRow {
   }
 }
 
-/* The list. `actions` are tick(name, drives, began), where undefined drives are where it pays
-   best and none at all unticks; and adopt, release and choose where there are values. */
+/* The list. `actions` are tick(name, drives, began), where undefined drives are where it reduces
+   the cost most and none at all unticks; adopt, release and choose. */
 export class EffectList {
   constructor(root, actions) {
     Object.assign(this, {root, actions, rows: new Map(), order: '', text: ''});

@@ -9,7 +9,7 @@ const tile = (name) => {
   const box = make('div', '', 'error');
   box.dataset.drive = name;
   const line = make('div', '', 'name');
-  line.append(make('span', name), make('span', '', 'fall'));
+  line.append(make('span'), make('span', '', 'fall'));
   box.append(line, make('canvas'), make('div', '', 'figures'));
   return box;
 };
@@ -39,7 +39,9 @@ export const showErrors = (root, state) => {
     const [before, now, noise] = [one.before, one.now, one.noise].map(amount);
     const unit = unitOf(state, name);
     root.children[k].querySelector('.fall').textContent = change(one.before, one.now);
-    figures.replaceChildren(`${before} → `, make('span', now, 'now'), one.noise === null ? ` ${unit}` : ` → noise ${noise} ${unit}`);
+    root.children[k].querySelector('.name span').textContent = unit ? `${name} [${unit}]` : name;
+    figures.replaceChildren(`${before} → `, make('span', now, 'now'),
+                            one.noise === null ? '' : ` → noise ${noise}`);
     bars(canvas, one, most);
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label',

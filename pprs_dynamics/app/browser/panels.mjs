@@ -4,10 +4,10 @@ import {$, button, make} from './dom.mjs';
 import {amount, plain, titleOf} from './format.mjs';
 
 const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing or have other values',
-                  ambiguous: 'several effects explain it alike',
-                  unknown: 'something no effect explains'};
+                  ambiguous: 'several effects explain the error alike',
+                  unknown: 'an error remains that no effect explains'};
 /* The same, since a reference run. */
-const CHANGES = {adequate: 'nothing has changed', effect: 'what is called for has changed',
+const CHANGES = {adequate: 'nothing has changed', effect: 'the reported effects have changed',
                  ambiguous: 'several effects explain alike what has changed',
                  unknown: 'something has changed that no effect explains'};
 

@@ -90,8 +90,7 @@ const begin = async (since) => {
   if (since !== server.state.fitted_since) return; // overtaken
   const {seconds, rest} = arrays;
   const time = Float64Array.from(seconds.values, (s, k) => s + rest.values[k]);
-  curves.use(header.drives, header.drives.map(() => time), arrays.segment.values,
-             rowsOf(arrays.before));
+  curves.use(header.drives, time, arrays.segment.values, rowsOf(arrays.before));
   if (latest[0].length === time.length) curves.setNow(latest);
   bench.curves = curves;
   const options = (names) => names.map((name) => make('option', titleOf(name), '', {value: name}));

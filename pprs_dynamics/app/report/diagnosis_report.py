@@ -134,7 +134,7 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
     if diagnosis.candidates:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
-                [(candidate.name, f'{-candidate.cost:.0f}', plain(candidate.error_after),
+                [(candidate.name, f'{candidate.evidence:.0f}', plain(candidate.error_after),
                   sites(candidate.names[0][1], diagnosis)) for candidate in diagnosis.candidates]))
 
 

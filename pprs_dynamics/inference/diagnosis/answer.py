@@ -98,12 +98,11 @@ class Answer:
         self.design, self.given = row.fits.design, table.first.design.residuals
         self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
         self.remaining = self._remaining()
-        # What a row leaves without an effect that was found no finding is no noise.
-        fits, fitted = (self.fits, self.fitted) if row is table.best else (
-            table.best.fits, table.best.fitted)
+        # Always that of the best row: the residual of a row that lacks an effect is no noise.
+        best = table.best
         self.noise: dict[str, NoiseSpectrum] = {
             self.drives[d]: spectrum
-            for d, spectrum in fits.regression.noise(fitted.fit).items()}
+            for d, spectrum in best.fits.regression.noise(best.fitted.fit).items()}
         # The residual of the reported set is an upper bound of the noise.
         most = {self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
                 for d in self.fits.regression.drives}

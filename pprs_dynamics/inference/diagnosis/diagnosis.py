@@ -72,6 +72,11 @@ class RankedSet:
         return self.terms.total
 
     @property
+    def evidence(self) -> float:
+        """By how much it costs less than the other set."""
+        return -self.cost
+
+    @property
     def name(self) -> str:
         """Names of its effects."""
         return ' and '.join(name for name, _ in self.names)
@@ -85,7 +90,7 @@ class RankedSet:
     def alone(self) -> dict[str, Any]:
         """Return the JSON of a set of one effect."""
         (name, drives), = self.names
-        return {'name': name, 'drives': drives, 'evidence': -self.cost}
+        return {'name': name, 'drives': drives, 'evidence': self.evidence}
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # naming files needs no diagnosis
 MOUNTING = 'mounting'  # kind of a finding on the direction of gravity
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
+REPEAT = 'Repeat the motion and diagnose both recordings: an error that repeats is the machine'
 
 
 @dataclass(frozen=True)
@@ -157,11 +158,9 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
             return ('Look at that place on the machine. A measured curve compensates the error '
                     'until the cause is known', files.command(
                         'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
-        return ('Look at that place on the machine. Repeat the motion and diagnose both '
-                'recordings: an error that repeats is the machine', both)
+        return f'Look at that place on the machine. {REPEAT}', both
     if diagnosis.above_noise:
-        return ('Repeat the motion and diagnose both recordings: an error that repeats is the '
-                'machine', both)
+        return REPEAT, both
     if diagnosis.verdict == 'ambiguous':
         if all(_need_another_load(names) for names in diagnosis.indistinguishable):
             return ('Repeat the motion with another load: only friction by load grows with it. '
@@ -180,7 +179,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Confirm them on the machine, then add them', files.command(
             'diagnose', '--adopt-all', '--output', files.output('better.yaml'), held_out=True))
     if diagnosis.suspects:
-        return 'Repeat the recording: an error that repeats is the machine', both
+        return REPEAT, both
     return 'Nothing to add. Another motion may excite other effects', other
 
 

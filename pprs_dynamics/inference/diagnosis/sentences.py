@@ -152,7 +152,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
         tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
-              f'explains the data as well (evidence {-suspect.cost:.0f}, threshold 0). '
+              f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
               'Repeat the recording' for suspect in diagnosis.suspects),
         tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
               for ranked in diagnosis.barred),

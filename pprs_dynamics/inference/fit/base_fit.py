@@ -58,8 +58,8 @@ class BaseFit:
         The same on held-out data.
     held_out_on : {'recordings', 'halves', 'validation'}
         Each recording, or half of the only one, predicted from the others; or the validation.
-    explained_before, explained : dict of str to float
-        Share of each drive's effort that the model explained, and that the fitted one explains.
+    explained : dict of str to float
+        Share of each drive's effort that the fitted model explains.
     little : dict of str to float
         Drives of whose effort the fitted model explains little, with the shares.
     """
@@ -72,7 +72,6 @@ class BaseFit:
     held_out_before: dict[str, float]
     held_out: dict[str, float]
     held_out_on: str
-    explained_before: dict[str, float]
     explained: dict[str, float]
     little: dict[str, float]
 
@@ -96,7 +95,7 @@ class BaseFit:
             'numbers': [vars(number) for number in self.numbers],
             'error_before': self.before, 'error_after': self.after,
             **{key: getattr(self, key) for key in (
-                'notes', 'held_out', 'held_out_on', 'explained_before', 'explained')}})
+                'notes', 'held_out', 'held_out_on', 'explained')}})
         return content
 
 
@@ -140,8 +139,7 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
     held_out_before = _errors([(model, validate)]) if validate else rms_by_drive(before)
     return BaseFit(fitted, numbers, (*notes, PART_OF_IT), rms_by_drive(before),
                    rms_by_drive(after), held_out_before, _errors(folds), on,
-                   explained_shares(before), explained_shares(after),
-                   little_explained(fitted, after))
+                   explained_shares(after), little_explained(fitted, after))
 
 
 def require_open_numbers(model: DriveModel) -> None:

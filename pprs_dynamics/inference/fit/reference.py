@@ -63,10 +63,9 @@ from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-# Tried: in standard deviations of the positions, and in turns of the directions.
-LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
-# The same of the process over one drive's own state.
-OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
+# Over which forces are alike, in standard deviations of the positions and in turns of the
+# directions: of the process over all drives, and of that over one drive's own state.
+LENGTHS, OWN_LENGTHS = (0.5, 1.2), (0.8, 1.2)
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
@@ -400,21 +399,11 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
                gears: Sequence[float]) -> Processes:
     """Return the process over all drives, and for each drive that of its state, and waves.
 
-    Lengths maximise the evidence, of one drive after another with the base alone, then of the
-    shared process with these; waves are those of the residual.
+    Waves are those of the residual.
     """
     plain, drives = States.of(residuals), range(len(residuals.drives))
-
-    def evidence(d: int, features: Sequence[Array]) -> float:
-        """Return the deviance of a drive with processes; 0 for one that was not measured."""
-        return _sized(residuals, columns, d, features)[1].deviance if d in measured else 0.0
-
-    own = [min((Process.of(residuals, replace(plain, lengths=lengths), d)
-                for lengths in OWN_LENGTHS), key=lambda found: evidence(d, found[1:]))
-           for d in drives]
-    shared, features = min(
-        (Process.of(residuals, replace(plain, lengths=lengths)) for lengths in LENGTHS),
-        key=lambda found: sum(evidence(d, (found[1], own[d][1])) for d in drives))
+    shared, features = Process.of(residuals, replace(plain, lengths=LENGTHS))
+    own = [Process.of(residuals, replace(plain, lengths=OWN_LENGTHS), d) for d in drives]
     found = []
     for d in drives:
         rest = residuals.error[:, d]

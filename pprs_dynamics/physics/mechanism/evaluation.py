@@ -3,7 +3,7 @@
 
 """Evaluation of the equations over samples, by loops that Numba compiles.
 
-A *loop* is a function that goes over the samples of tables, evaluates equations, and writes to
+A *loop* is a function that evaluates equations for all samples of tables in turn and writes to
 other tables.
 
 Loading compiled code takes 0.3 s, compiling it the first time 15 s. Where nothing may wait for

@@ -42,7 +42,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
-from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.tree_tables import OF_CLOSURE, TRANSLATION, Integers, Model
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
@@ -336,13 +336,13 @@ class _Builder:
                 placed, pairwise(starts), strict=True)]).reshape(-1, 4),
             rows=_integers([(k, row[0], *row[1]) for k, row in rows]).reshape(-1, 6),
             path=_integers([*zip(joints, signs, strict=True)]).reshape(-1, 2),
-            frames=_vectors(each for frame, axis in zip(self.place, self.axis, strict=True)
-                            for each in (*frame.R, frame.p, axis)),
+            frames=np.array([[*frame.R, frame.p, axis] for frame, axis in zip(
+                self.place, self.axis, strict=True)]),
             ratio=np.array(self.ratio), offset=np.array(self.offset),
             stride=np.array([STRIDE_SLIDE * size if self.slides[c] else STRIDE_TURN
                              for c in driven]),
-            closure_frames=_vectors(each for _, a, _, b in placed
-                                    for each in (*a.R, a.p, *b.R, b.p)),
+            closure_frames=np.array([[*a.R, a.p, *b.R, b.p] for _, a, _, b in placed],
+                                    dtype=float).reshape(-1, OF_CLOSURE, 3),
             row_reals=_vectors((*row[2], size if row[0] == TRANSLATION else 1.0)
                                for _, row in rows),
             passive_unit=np.zeros(0))

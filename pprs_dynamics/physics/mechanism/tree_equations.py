@@ -44,10 +44,6 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     LOOP_A,
     LOOP_B,
     MOMENT,
-    OF_CLOSURE,
-    OF_FORCES,
-    OF_FRAME,
-    OF_LINK,
     OFFSET,
     OPEN,
     PARENT,
@@ -90,31 +86,31 @@ WORST_CONDITION = 300.0
 OPEN_IN_MOTION = 1e-3
 
 
-def vector(table: Any, k: int) -> Vector:
-    """Return a row as a vector."""
-    return Vector(table[k, 0], table[k, 1], table[k, 2])
+def vector(table: Any, j: int, k: int) -> Vector:
+    """Return row k of a joint or closure as a vector."""
+    return Vector(table[j, k, 0], table[j, k, 1], table[j, k, 2])
 
 
-def column(table: Any, k: int, c: int) -> Vector:
-    """Return column c of the matrix that begins with row k."""
-    return Vector(table[k, c], table[k + 1, c], table[k + 2, c])
+def column(table: Any, j: int, k: int, c: int) -> Vector:
+    """Return column c of the matrix that begins with row k of a joint or closure."""
+    return Vector(table[j, k, c], table[j, k + 1, c], table[j, k + 2, c])
 
 
-def put(table: Any, k: int, v: Vector) -> None:
-    """Write a vector to a row."""
-    table[k, 0], table[k, 1], table[k, 2] = v.x, v.y, v.z
+def put(table: Any, j: int, k: int, v: Vector) -> None:
+    """Write a vector to row k of a joint or closure."""
+    table[j, k, 0], table[j, k, 1], table[j, k, 2] = v.x, v.y, v.z
 
 
-def put_column(table: Any, k: int, c: int, v: Vector) -> None:
-    """Write a vector to column c of the matrix that begins with row k."""
-    table[k, c], table[k + 1, c], table[k + 2, c] = v.x, v.y, v.z
+def put_column(table: Any, j: int, k: int, c: int, v: Vector) -> None:
+    """Write a vector to column c of the matrix that begins with row k of a joint or closure."""
+    table[j, k, c], table[j, k + 1, c], table[j, k + 2, c] = v.x, v.y, v.z
 
 
-def increase(table: Any, k: int, v: Vector) -> None:
-    """Add a vector to a row."""
-    table[k, 0] += v.x
-    table[k, 1] += v.y
-    table[k, 2] += v.z
+def increase(table: Any, j: int, k: int, v: Vector) -> None:
+    """Add a vector to row k of a joint or closure."""
+    table[j, k, 0] += v.x
+    table[j, k, 1] += v.y
+    table[j, k, 2] += v.z
 
 
 def length(v: Vector) -> Any:
@@ -122,15 +118,15 @@ def length(v: Vector) -> Any:
     return sqrt(dot(v, v))
 
 
-def turned(table: Any, k: int, v: Vector) -> Vector:
-    """Return the matrix that begins with row k times a vector."""
-    return Vector(dot(vector(table, k), v), dot(vector(table, k + 1), v),
-                  dot(vector(table, k + 2), v))
+def turned(table: Any, j: int, k: int, v: Vector) -> Vector:
+    """Return the matrix that begins with row k of a joint or closure times a vector."""
+    return Vector(dot(vector(table, j, k), v), dot(vector(table, j, k + 1), v),
+                  dot(vector(table, j, k + 2), v))
 
 
-def turned_back(table: Any, k: int, v: Vector) -> Vector:
+def turned_back(table: Any, j: int, k: int, v: Vector) -> Vector:
     """Return the transpose of the matrix that begins with row k times a vector."""
-    x, y, z = vector(table, k), vector(table, k + 1), vector(table, k + 2)
+    x, y, z = vector(table, j, k), vector(table, j, k + 1), vector(table, j, k + 2)
     return plus(plus(times(v.x, x), times(v.y, y)), times(v.z, z))
 
 
@@ -187,15 +183,15 @@ def update_frame_placements(t: Model, m: Data) -> None:
     links, frames = m.links, t.frames
     for r in range(3):
         for c in range(3):
-            links[R + r, c] = 1.0 if r == c else 0.0
-        links[P, r] = 0.0
+            links[0, R + r, c] = 1.0 if r == c else 0.0
+        links[0, P, r] = 0.0
     for j in range(1, len(t.joints)):
-        at, above, own = OF_LINK * j, OF_LINK * t.joints[j, PARENT], OF_FRAME * j
+        i = t.joints[j, PARENT]
         s = t.ratio[j] * m.q[t.joints[j, COORDINATE]] + t.offset[j]
-        axis = vector(frames, own + AXIS)
-        origin = plus(vector(links, above + P), turned(links, above + R,
-                                                       vector(frames, own + PLACE_P)))
-        z = turned(links, above + R, turned(frames, own + PLACE_R, axis))
+        axis = vector(frames, j, AXIS)
+        origin = plus(vector(links, i, P), turned(links, i, R,
+                                                       vector(frames, j, PLACE_P)))
+        z = turned(links, i, R, turned(frames, j, PLACE_R, axis))
         if t.joints[j, TURNS]:
             # Columns of the rotation about the axis, each taken to the base.
             C, S = cos(s), sin(s)
@@ -203,43 +199,44 @@ def update_frame_placements(t: Model, m: Data) -> None:
             x_of = Vector(C + e.x * axis.x, e.y * axis.x + S * axis.z, e.z * axis.x - S * axis.y)
             y_of = Vector(e.x * axis.y - S * axis.z, C + e.y * axis.y, e.z * axis.y + S * axis.x)
             z_of = Vector(e.x * axis.z + S * axis.y, e.y * axis.z - S * axis.x, C + e.z * axis.z)
-            put_column(links, at + R, 0, turned(links, above, turned(frames, own, x_of)))
-            put_column(links, at + R, 1, turned(links, above, turned(frames, own, y_of)))
-            put_column(links, at + R, 2, turned(links, above, turned(frames, own, z_of)))
+            put_column(links, j, R, 0, turned(links, i, R, turned(frames, j, PLACE_R, x_of)))
+            put_column(links, j, R, 1, turned(links, i, R, turned(frames, j, PLACE_R, y_of)))
+            put_column(links, j, R, 2, turned(links, i, R, turned(frames, j, PLACE_R, z_of)))
         else:
             origin = plus(origin, times(s, z))
             for c in range(3):
-                put_column(links, at + R, c, turned(links, above, column(frames, own, c)))
-        put(links, at + P, origin)
-        put(links, at + Z, z)
+                put_column(links, j, R, c, turned(links, i, R, column(frames, j, PLACE_R, c)))
+        put(links, j, P, origin)
+        put(links, j, Z, z)
     for k in range(len(t.closures)):
         for side in range(2):
-            j, own = OF_LINK * t.closures[k, side], OF_CLOSURE * k + side * B_R
-            put(m.loops, own + A_P, plus(vector(links, j + P), turned(
-                links, j, vector(t.closure_frames, own + A_P))))
+            j, own = t.closures[k, side], side * B_R
+            put(m.loops, k, own + A_P, plus(vector(links, j, P), turned(
+                links, j, R, vector(t.closure_frames, k, own + A_P))))
             for c in range(3):
-                put_column(m.loops, own, c, turned(links, j, column(t.closure_frames, own, c)))
+                put_column(m.loops, k, own, c,
+                           turned(links, j, R, column(t.closure_frames, k, own, c)))
 
 
 def residual(t: Model, m: Data, r: int) -> Any:
     """Return a row's value: by how much a closure is open [m, rad]."""
-    k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
-        return dot(column(loops, k + A_R, i), minus(vector(loops, k + B_P), vector(loops, k + A_P)))
+        return dot(column(loops, k, A_R, i), minus(vector(loops, k, B_P), vector(loops, k, A_P)))
     j, g, h = t.rows[r, AXES + 1], t.rows[r, AXES + 2], t.rows[r, AXES + 3]
-    return (t.row_reals[r, 0] * dot(column(loops, k + A_R, i), column(loops, k + B_R, j))
-            + t.row_reals[r, 1] * dot(column(loops, k + A_R, g), column(loops, k + B_R, h)))
+    return (t.row_reals[r, 0] * dot(column(loops, k, A_R, i), column(loops, k, B_R, j))
+            + t.row_reals[r, 1] * dot(column(loops, k, A_R, g), column(loops, k, B_R, h)))
 
 
 def row_axis(t: Model, m: Data, r: int) -> Vector:
     """Return what a row multiplies the relative velocity by: of points, or angular."""
-    k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
-        return column(loops, k + A_R, i)
+        return column(loops, k, A_R, i)
     j, g, h = t.rows[r, AXES + 1], t.rows[r, AXES + 2], t.rows[r, AXES + 3]
     return plus(
-        times(t.row_reals[r, 0], product(column(loops, k + B_R, j), column(loops, k + A_R, i))),
-        times(t.row_reals[r, 1], product(column(loops, k + B_R, h), column(loops, k + A_R, g))))
+        times(t.row_reals[r, 0], product(column(loops, k, B_R, j), column(loops, k, A_R, i))),
+        times(t.row_reals[r, 1], product(column(loops, k, B_R, h), column(loops, k, A_R, g))))
 
 
 def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) -> None:
@@ -261,14 +258,14 @@ def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) ->
         k, of_points = t.rows[r, LOOP], t.rows[r, KIND] == TRANSLATION
         e = row_axis(t, m, r)
         # Per rate of a joint on the side of B: e' (z x (p_B - p)), e' z, or nothing.
-        moment = product(vector(m.loops, OF_CLOSURE * k + B_P), e)
+        moment = product(vector(m.loops, k, B_P), e)
         for n in range(t.closures[k, PATH_START], t.closures[k, PATH_END]):
             j = t.path[n, JOINT]
             turns = t.joints[j, TURNS]
             if not (of_points or turns):
                 continue
-            z = vector(m.links, OF_LINK * j + Z)
-            along = dot(z, minus(moment, product(vector(m.links, OF_LINK * j + P), e))) if (
+            z = vector(m.links, j, Z)
+            along = dot(z, minus(moment, product(vector(m.links, j, P), e))) if (
                 of_points and turns) else dot(z, e)
             x = t.path[n, SIGN] * t.ratio[j] * along
             c, d = places[t.joints[j, COORDINATE], 0], places[t.joints[j, COORDINATE], 1]
@@ -453,65 +450,63 @@ def velocities(t: Model, m: Data) -> None:
     """Fill in the velocities of the links."""
     links = m.links
     for c in range(3):
-        links[W, c] = links[U, c] = 0.0
+        links[0, W, c] = links[0, U, c] = 0.0
     for j in range(1, len(t.joints)):
-        at, above = OF_LINK * j, OF_LINK * t.joints[j, PARENT]
-        w = vector(links, above + W)
-        arm = minus(vector(links, at + P), vector(links, above + P))
-        u = plus(vector(links, above + U), product(w, arm))
-        own = times(t.ratio[j] * m.v[t.joints[j, COORDINATE]], vector(links, at + Z))
+        i = t.joints[j, PARENT]
+        w = vector(links, i, W)
+        arm = minus(vector(links, j, P), vector(links, i, P))
+        u = plus(vector(links, i, U), product(w, arm))
+        own = times(t.ratio[j] * m.v[t.joints[j, COORDINATE]], vector(links, j, Z))
         if t.joints[j, TURNS]:
             w = plus(w, own)
         else:
             u = plus(u, own)
-        put(links, at + W, w)
-        put(links, at + U, u)
+        put(links, j, W, w)
+        put(links, j, U, u)
 
 
 def accelerations(t: Model, m: Data) -> None:
     """Fill in the accelerations of the links."""
     links = m.links
     for c in range(3):
-        links[WD, c] = links[UD, c] = 0.0
+        links[0, WD, c] = links[0, UD, c] = 0.0
     for j in range(1, len(t.joints)):
-        at, above = OF_LINK * j, OF_LINK * t.joints[j, PARENT]
-        k, z = t.joints[j, COORDINATE], vector(links, at + Z)
-        w, wd = vector(links, above + W), vector(links, above + WD)
-        arm = minus(vector(links, at + P), vector(links, above + P))
-        ud = plus(plus(vector(links, above + UD), product(wd, arm)), product(w, product(w, arm)))
+        i = t.joints[j, PARENT]
+        k, z = t.joints[j, COORDINATE], vector(links, j, Z)
+        w, wd = vector(links, i, W), vector(links, i, WD)
+        arm = minus(vector(links, j, P), vector(links, i, P))
+        ud = plus(plus(vector(links, i, UD), product(wd, arm)), product(w, product(w, arm)))
         own = times(t.ratio[j] * m.a[k], z)
         turning = product(w, times(t.ratio[j] * m.v[k], z))
         if t.joints[j, TURNS]:
             wd = plus(plus(wd, own), turning)
         else:
             ud = plus(plus(ud, own), times(2.0, turning))
-        put(links, at + WD, wd)
-        put(links, at + UD, ud)
+        put(links, j, WD, wd)
+        put(links, j, UD, ud)
 
 
 def _point(m: Data, j: int, at: Vector) -> Any:
     """Return velocity and acceleration of a link's point at a place."""
-    k = OF_LINK * j
-    arm, w = minus(at, vector(m.links, k + P)), vector(m.links, k + W)
+    arm, w = minus(at, vector(m.links, j, P)), vector(m.links, j, W)
     v = product(w, arm)
-    return (plus(vector(m.links, k + U), v),
-            plus(plus(vector(m.links, k + UD), product(vector(m.links, k + WD), arm)),
+    return (plus(vector(m.links, j, U), v),
+            plus(plus(vector(m.links, j, UD), product(vector(m.links, j, WD), arm)),
                  product(w, v)))
 
 
 def _turning(m: Data, j: int, direction: Vector) -> Any:
     """Return first and second derivative of a direction fixed in a link."""
-    w = vector(m.links, OF_LINK * j + W)
+    w = vector(m.links, j, W)
     v = product(w, direction)
-    return v, plus(product(vector(m.links, OF_LINK * j + WD), direction), product(w, v))
+    return v, plus(product(vector(m.links, j, WD), direction), product(w, v))
 
 
 def row_acceleration(t: Model, m: Data, r: int) -> Any:
     """Return the second derivative of a row by time."""
     k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
-        own = OF_CLOSURE * k
-        e, p_a, p_b = column(loops, own, i), vector(loops, own + A_P), vector(loops, own + B_P)
+        e, p_a, p_b = column(loops, k, A_R, i), vector(loops, k, A_P), vector(loops, k, B_P)
         de, dde = _turning(m, t.closures[k, LOOP_A], e)
         v_a, a_a = _point(m, t.closures[k, LOOP_A], p_a)
         v_b, a_b = _point(m, t.closures[k, LOOP_B], p_b)
@@ -523,8 +518,7 @@ def row_acceleration(t: Model, m: Data, r: int) -> Any:
 
 
 def _angle_acceleration(t: Model, m: Data, k: int, i: int, j: int) -> Any:
-    own = OF_CLOSURE * k
-    a, b = column(m.loops, own + A_R, i), column(m.loops, own + B_R, j)
+    a, b = column(m.loops, k, A_R, i), column(m.loops, k, B_R, j)
     da, dda = _turning(m, t.closures[k, LOOP_A], a)
     db, ddb = _turning(m, t.closures[k, LOOP_B], b)
     return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
@@ -539,24 +533,24 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
     for j in range(1, len(t.joints)):
         if _is_zero(inertial, j):
             continue
-        mass, at = inertial[j, 0], OF_LINK * j
-        h = turned(links, at + R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
-        a, w, wd = minus(vector(links, at + UD), g), vector(links, at + W), vector(links, at + WD)
-        increase(o.links, OF_FORCES * j + FORCE, plus(
+        mass = inertial[j, 0]
+        h = turned(links, j, R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
+        a, w, wd = minus(vector(links, j, UD), g), vector(links, j, W), vector(links, j, WD)
+        increase(o.links, j, FORCE, plus(
             plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
         spin = plus(_inertia_times(links, j, inertial, wd),
                     product(w, _inertia_times(links, j, inertial, w)))
-        increase(o.links, OF_FORCES * j + MOMENT, plus(spin, product(h, a)))
+        increase(o.links, j, MOMENT, plus(spin, product(h, a)))
     for c in range(len(m.q)):
         o.tau[c] = 0.0
     for j in range(len(t.joints) - 1, 0, -1):
-        i, own = t.joints[j, PARENT], OF_FORCES * j
-        f, n = vector(o.links, own + FORCE), vector(o.links, own + MOMENT)
-        along = dot(vector(links, OF_LINK * j + Z), n if t.joints[j, TURNS] else f)
+        i = t.joints[j, PARENT]
+        f, n = vector(o.links, j, FORCE), vector(o.links, j, MOMENT)
+        along = dot(vector(links, j, Z), n if t.joints[j, TURNS] else f)
         o.tau[t.joints[j, COORDINATE]] += t.ratio[j] * along
-        arm = minus(vector(links, OF_LINK * j + P), vector(links, OF_LINK * i + P))
-        increase(o.links, OF_FORCES * i + FORCE, f)
-        increase(o.links, OF_FORCES * i + MOMENT, plus(n, product(arm, f)))
+        arm = minus(vector(links, j, P), vector(links, i, P))
+        increase(o.links, i, FORCE, f)
+        increase(o.links, i, MOMENT, plus(n, product(arm, f)))
     project_to_actuators(t, m, o.tau, o.efforts)
 
 
@@ -568,10 +562,10 @@ def _is_zero(inertial: Any, j: int) -> bool:
 
 
 def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
-    x, y, z = turned_back(links, OF_LINK * j + R, v)
+    x, y, z = turned_back(links, j, R, v)
     xx, xy, yy = inertial[j, 4], inertial[j, 5], inertial[j, 6]
     xz, yz, zz = inertial[j, 7], inertial[j, 8], inertial[j, 9]
-    return turned(links, OF_LINK * j + R, Vector(
+    return turned(links, j, R, Vector(
         xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
 
 
@@ -590,21 +584,21 @@ def constraint_forces(t: Model, m: Data, o: Loads) -> None:
     count, inverse = len(t.passive), m.inverse
     for k in range(len(o.loops)):
         for c in range(3):
-            o.loops[k, c] = 0.0
+            o.loops[k, FORCE, c] = o.loops[k, MOMENT, c] = 0.0
     for r in range(count):
         x = 0.0
         for c in range(count):
             x = x + inverse[c, r] * o.tau[t.passive[c]]
         kind = FORCE if t.rows[r, KIND] == TRANSLATION else MOMENT
-        increase(o.loops, OF_FORCES * t.rows[r, LOOP] + kind, times(x, row_axis(t, m, r)))
+        increase(o.loops, t.rows[r, LOOP], kind, times(x, row_axis(t, m, r)))
     for k in range(len(t.closures)):
-        F, N = vector(o.loops, OF_FORCES * k + FORCE), vector(o.loops, OF_FORCES * k + MOMENT)
-        p_b = vector(m.loops, OF_CLOSURE * k + B_P)
+        F, N = vector(o.loops, k, FORCE), vector(o.loops, k, MOMENT)
+        p_b = vector(m.loops, k, B_P)
         for s in range(t.closures[k, PATH_START], t.closures[k, PATH_END]):
             j, sign = t.path[s, JOINT], 1.0 * t.path[s, SIGN]
-            arm = minus(p_b, vector(m.links, OF_LINK * j + P))
-            increase(o.links, OF_FORCES * j + FORCE, times(-sign, F))
-            increase(o.links, OF_FORCES * j + MOMENT, times(-sign, plus(N, product(arm, F))))
+            arm = minus(p_b, vector(m.links, j, P))
+            increase(o.links, j, FORCE, times(-sign, F))
+            increase(o.links, j, MOMENT, times(-sign, plus(N, product(arm, F))))
 
 
 def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
@@ -644,19 +638,19 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
         if j >= 0:
             c = t.joints[j, COORDINATE]
             rate = t.ratio[j] * m.v[c]
-            across = product(vector(o.links, OF_FORCES * j + FORCE), vector(links, OF_LINK * j + Z))
+            across = product(vector(o.links, j, FORCE), vector(links, j, Z))
             dry = s.torque[k] + s.lever[k] * length(across)
             of_tree[c] += t.ratio[j] * (s.viscous[k] * rate + dry * tanh(rate / s.width[k]))
         else:
             g = s.loop[k]
-            relative = minus(vector(links, OF_LINK * t.closures[g, LOOP_B] + W),
-                             vector(links, OF_LINK * t.closures[g, LOOP_A] + W))
+            relative = minus(vector(links, t.closures[g, LOOP_B], W),
+                             vector(links, t.closures[g, LOOP_A], W))
             speed = larger(length(relative), 1e-8 * s.width[k])
-            dry = s.torque[k] + s.lever[k] * length(vector(o.loops, OF_FORCES * g + FORCE))
+            dry = s.torque[k] + s.lever[k] * length(vector(o.loops, g, FORCE))
             moment = times(s.viscous[k] + dry * tanh(speed / s.width[k]) / speed, relative)
             for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
                 i = t.path[n, JOINT]
                 if t.joints[i, TURNS]:
                     of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
-                        vector(links, OF_LINK * i + Z), moment)
+                        vector(links, i, Z), moment)
     project_to_actuators(t, m, of_tree, efforts)

@@ -33,7 +33,9 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
 )
 from pprs_dynamics.physics.mechanism.tree_tables import (
     EFFORTS,
+    FORCE,
     JOINT_EFFORT,
+    MOMENT,
     OF_DRIVE,
     STEPS,
     TRANSMITTED,
@@ -124,7 +126,7 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
             if not stages & KEPT:
                 for k in range(len(o.links)):
                     for c in range(3):
-                        o.links[k, c] = 0.0
+                        o.links[k, FORCE, c] = o.links[k, MOMENT, c] = 0.0
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
             if not stages & KEPT:

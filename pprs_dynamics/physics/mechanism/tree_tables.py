@@ -39,28 +39,34 @@ UNIT = 2  # column of `row_reals`
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 
 
-# Columns of tables, and rows of tables of vectors, by the names under which they are read: table,
-# column; table, rows of each group, the first of these and their number.
-COLUMNS = {'parent': ('joints', PARENT), 'turns': ('joints', TURNS),
-           'coordinate': ('joints', COORDINATE), 'loop_a': ('closures', LOOP_A),
-           'loop_b': ('closures', LOOP_B), 'row_unit': ('row_reals', UNIT)}
-PARTS = {
+def _vector(k: int) -> Any:
+    return np.s_[..., k, :]
+
+
+def _matrix(k: int) -> Any:
+    return np.s_[..., k:k + 3, :]
+
+
+# Parts of tables by the names under which they are read.
+PARTS: dict[str, tuple[str, Any]] = {
+    'parent': ('joints', np.s_[..., PARENT]), 'turns': ('joints', np.s_[..., TURNS]),
+    'coordinate': ('joints', np.s_[..., COORDINATE]), 'loop_a': ('closures', np.s_[..., LOOP_A]),
+    'loop_b': ('closures', np.s_[..., LOOP_B]), 'row_unit': ('row_reals', np.s_[..., UNIT]),
     # Of a joint: orientation and origin in its parent, and axis.
-    'place_R': ('frames', OF_FRAME, PLACE_R, 3), 'place_p': ('frames', OF_FRAME, PLACE_P, 1),
-    'axis': ('frames', OF_FRAME, AXIS, 1),
+    'place_R': ('frames', _matrix(PLACE_R)), 'place_p': ('frames', _vector(PLACE_P)),
+    'axis': ('frames', _vector(AXIS)),
     # Of a closure: frames A and B in their links.
-    'a_R': ('closure_frames', OF_CLOSURE, A_R, 3), 'a_p': ('closure_frames', OF_CLOSURE, A_P, 1),
-    'b_R': ('closure_frames', OF_CLOSURE, B_R, 3), 'b_p': ('closure_frames', OF_CLOSURE, B_P, 1),
+    'a_R': ('closure_frames', _matrix(A_R)), 'a_p': ('closure_frames', _vector(A_P)),
+    'b_R': ('closure_frames', _matrix(B_R)), 'b_p': ('closure_frames', _vector(B_P)),
     # Of a joint's link: orientation, origin, axis, angular and linear velocity and acceleration.
-    'R': ('links', OF_LINK, R, 3), 'p': ('links', OF_LINK, P, 1), 'z': ('links', OF_LINK, Z, 1),
-    'w': ('links', OF_LINK, W, 1), 'u': ('links', OF_LINK, U, 1),
-    'wd': ('links', OF_LINK, WD, 1), 'ud': ('links', OF_LINK, UD, 1),
+    'R': ('links', _matrix(R)), 'p': ('links', _vector(P)), 'z': ('links', _vector(Z)),
+    'w': ('links', _vector(W)), 'u': ('links', _vector(U)), 'wd': ('links', _vector(WD)),
+    'ud': ('links', _vector(UD)),
     # Of a closure: orientation and origin of its frames A and B.
-    'A': ('loops', OF_CLOSURE, A_R, 3), 'pA': ('loops', OF_CLOSURE, A_P, 1),
-    'B': ('loops', OF_CLOSURE, B_R, 3), 'pB': ('loops', OF_CLOSURE, B_P, 1),
+    'A': ('loops', _matrix(A_R)), 'pA': ('loops', _vector(A_P)), 'B': ('loops', _matrix(B_R)),
+    'pB': ('loops', _vector(B_P)),
     # What joints and closures transmit: force, and moment about the joint's origin.
-    'f': ('links', OF_FORCES, FORCE, 1), 'n': ('links', OF_FORCES, MOMENT, 1),
-    'F': ('loops', OF_FORCES, FORCE, 1)}
+    'f': ('links', _vector(FORCE)), 'n': ('links', _vector(MOMENT)), 'F': ('loops', _vector(FORCE))}
 
 
 def _read(tables: tuple[Any, ...], name: str) -> Any:
@@ -71,15 +77,10 @@ def _read(tables: tuple[Any, ...], name: str) -> Any:
     AttributeError
         For a name that they have not.
     """
-    table, *place = COLUMNS.get(name) or PARTS.get(name) or ('',)
+    table, part = PARTS.get(name, ('', ()))
     if table not in tables._fields:  # type: ignore[attr-defined]
         raise AttributeError(f'{type(tables).__name__} has no {name}')
-    values = getattr(tables, table)
-    if len(place) == 1:
-        return values[..., place[0]]
-    of, first, rows = place
-    groups = values.reshape(*values.shape[:-2], -1, of, 3)
-    return groups[..., first, :] if rows == 1 else groups[..., first:first + rows, :]
+    return getattr(tables, table)[part]
 
 
 class Model(NamedTuple):
@@ -91,7 +92,7 @@ class Model(NamedTuple):
     ----------
     joints : (J + 1, 3) int array
         Parent, whether it turns, coordinate.
-    frames : ((J + 1) OF_FRAME, 3) array
+    frames : (J + 1, OF_FRAME, 3) array
         Frame at position 0 in the parent's, and axis in the joint's.
     ratio, offset : (J + 1,) arrays
         A joint's position is ratio q[coordinate] + offset.
@@ -103,7 +104,7 @@ class Model(NamedTuple):
         By which drives move between closings.
     closures : (L, 4) int array
         Joints whose links it connects; where its path begins and ends.
-    closure_frames : (L OF_CLOSURE, 3) array
+    closure_frames : (L, OF_CLOSURE, 3) array
         Frames A and B there.
     rows : (r, 6) int array
         Closure, kind, and four axes. Translation along the first (axis of A); angle: axis of A,
@@ -125,11 +126,11 @@ class Model(NamedTuple):
     closures: Annotated[Integers, 'loops', 4]
     rows: Annotated[Integers, 'rows', 6]
     path: Annotated[Integers, 'path', 2]
-    frames: Annotated[Array, 'frames', 3]
+    frames: Annotated[Array, 'joints', OF_FRAME, 3]
     ratio: Annotated[Array, 'joints']
     offset: Annotated[Array, 'joints']
     stride: Annotated[Array, 'drives']
-    closure_frames: Annotated[Array, 'closure_frames', 3]
+    closure_frames: Annotated[Array, 'loops', OF_CLOSURE, 3]
     row_reals: Annotated[Array, 'rows', 3]
     passive_unit: Annotated[Array, 'passive']
 
@@ -144,10 +145,10 @@ class Data(NamedTuple):
     ----------
     q, v, a : (C,) arrays
         Of all coordinates.
-    links : ((J + 1) OF_LINK, 3) array
+    links : (J + 1, OF_LINK, 3) array
         Orientation, origin, axis, angular and linear velocity and acceleration of each joint's
         link, at its origin.
-    loops : (L OF_CLOSURE, 3) array
+    loops : (L, OF_CLOSURE, 3) array
         Frames of the closures.
     drive_to_joint : (C, D) array
         T: rates of all coordinates per rate of each drive.
@@ -163,8 +164,8 @@ class Data(NamedTuple):
     q: Annotated[Any, 'coordinates']
     v: Annotated[Any, 'coordinates']
     a: Annotated[Any, 'coordinates']
-    links: Annotated[Any, 'links', 3]
-    loops: Annotated[Any, 'closure_frames', 3]
+    links: Annotated[Any, 'joints', OF_LINK, 3]
+    loops: Annotated[Any, 'loops', OF_CLOSURE, 3]
     drive_to_joint: Annotated[Any, 'coordinates', 'drives']
     inverse: Annotated[Any, 'passive', 'solved']
     solution: Annotated[Any, 4]
@@ -181,9 +182,9 @@ class Loads(NamedTuple):
 
     Parameters
     ----------
-    links : ((J + 1) OF_FORCES, 3) array
+    links : (J + 1, OF_FORCES, 3) array
         What each joint transmits to its link: force, and moment about its origin.
-    loops : (L OF_FORCES, 3) array
+    loops : (L, OF_FORCES, 3) array
         What the link of A does to that of B in each closure: force and moment.
     tau, tau_friction : (C,) arrays
         Efforts of the tree's coordinates: of the bodies, and against friction of joints.
@@ -191,8 +192,8 @@ class Loads(NamedTuple):
         Of the drives.
     """
 
-    links: Annotated[Any, 'forces', 3]
-    loops: Annotated[Any, 'loop_forces', 3]
+    links: Annotated[Any, 'joints', OF_FORCES, 3]
+    loops: Annotated[Any, 'loops', OF_FORCES, 3]
     tau: Annotated[Any, 'coordinates']
     tau_friction: Annotated[Any, 'coordinates']
     efforts: Annotated[Any, 'drives']
@@ -226,8 +227,7 @@ TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4
 
 
 # Names of the numbers of rows of the tables, and of the columns of some.
-SIZES = ('frames', 'joints', 'coordinates', 'drives', 'passive', 'loops', 'closure_frames', 'rows',
-         'path', 'links', 'forces', 'loop_forces', 'solved')
+SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'solved')
 
 
 @cache
@@ -241,8 +241,7 @@ def _sizes_of(t: Model) -> Integers:
     """Return the numbers that `SIZES` names, of tables."""
     found = {name: rows for table, shape in _shapes(Model).items()
              for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
-    found |= {'links': OF_LINK * len(t.joints), 'forces': OF_FORCES * len(t.joints),
-              'loop_forces': OF_FORCES * len(t.closures), 'solved': len(t.passive) + len(t.drives)}
+    found['solved'] = len(t.passive) + len(t.drives)
     return np.array([found[name] for name in SIZES], dtype=np.int64)
 
 

@@ -110,8 +110,8 @@ class ClosedForm:
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
             table = np.empty((closed_form.EVERYTHING, len(motion), 6))
-            parameters = robot.parameters(joints, closed_form.FRICTIONLESS_DRIVES)
-            self.is_regular = run(closed_form.forces, parameters, motion.rows, loads, table) < 0
+            self.is_regular = run(closed_form.forces, robot.friction_parameters(joints),
+                                  motion.rows, loads, table) < 0
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
@@ -334,17 +334,20 @@ class ThreePprs:
         return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
                                Vector(*self.gravity))
 
-    def parameters(self, joints: Joints, drives: tuple[DriveParameters, ...],
-                   ) -> Array:
-        """Return the parameters of `closed_form.forces` with friction of joints and drives."""
+    def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
+        """Return the parameters of `closed_form.forces`, for `one_pass`.
+
+        Parameters
+        ----------
+        joints : Joints
+        drives : (OF_DRIVE, 6) array, optional
+            Without it the drives have no friction.
+        """
+        friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
+            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist())
         return row_of(closed_form.ForcesParameters(
             self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
-            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives))
-
-    def friction_parameters(self, joints: Joints, drives: Array) -> Array:
-        """Return friction of joints and numbers of drives, (OF_DRIVE, 6), for `one_pass`."""
-        return self.parameters(joints, tuple(
-            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist()))
+            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, friction))
 
     def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
                  ) -> PassResult | None:

@@ -182,7 +182,7 @@ class Api:
                 {'fitted_since': ticks.fitted_since, 'drives': list(ticks.fits.drives),
                  'quantities': quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
-                 'before': ticks.fits.before.T, 'measured': data.measured.T})
+                 'before': ticks.fits.before.T})
 
     def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""

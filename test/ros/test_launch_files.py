@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the launch files start, with which parameters and arguments."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+from launch_stand_in import install
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.model.keys import NODE_KEYS
+from pprs_dynamics.ros import executables
+
+PROJECT = Path(__file__).parents[2]
+MODEL = str(PROJECT / 'config' / 'hexapod.yaml')
+STARTED = {  # each node, and whether a supervisor can lead it through its states
+    'demo': {'simulated_robot': False, 'feedforward': True, 'monitor': True,
+             'play_trajectory': False},
+    'display': {'monitor': True}, 'feedforward': {'feedforward': True, 'monitor': True},
+    'monitor': {'monitor': True}, 'workbench': {}}
+
+
+def described(name: str, monkeypatch: pytest.MonkeyPatch, **given: str,
+              ) -> tuple[dict[str, Any], list[Any]]:
+    """Return the arguments of a launch file, and its actions with some of them given."""
+    install(monkeypatch)
+    found = runpy.run_path(str(PROJECT / 'launch' / f'{name}.launch.py'))
+    actions = found['generate_launch_description']().arguments[0]
+    declared = {each.arguments[0]: each.options for each in actions
+                if type(each).__name__ == 'DeclareLaunchArgument'}
+    values = {key: options.get('default_value') for key, options in declared.items()}
+    opaque, = (each for each in actions if type(each).__name__ == 'OpaqueFunction')
+    return declared, opaque.options['function']({**values, **given})
+
+
+@pytest.mark.parametrize('name', STARTED)
+def test_a_launch_file_starts_its_nodes_with_parameters_that_they_have(
+    name: str, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    declared, actions = described(name, monkeypatch, model=MODEL)
+    assert {'model', 'namespace', 'use_sim_time', 'parameters'} <= declared.keys()
+    assert all(options['description'] for options in declared.values())
+    if name == 'workbench':
+        command = [str(word) for word in actions[0].options['cmd'] if isinstance(word, str)]
+        assert command[:2] == ['workbench', '--live']
+        assert MODEL in command
+        return
+    nodes = {each.options['executable']: each for each in actions}
+    assert {key: type(each).__name__ == 'LifecycleNode' for key, each in nodes.items()} == (
+        STARTED[name])
+    for key, each in nodes.items():
+        assert callable(getattr(executables, key))
+        assert each.options['package'] == 'pprs_dynamics'
+        assert each.options['namespace'].arguments == ('namespace',)
+        file, *given = each.options['parameters']
+        assert file == MODEL
+        names = {parameter for values in given for parameter in values}
+        assert 'use_sim_time' in names
+        assert names <= NODE_KEYS
+
+
+@pytest.mark.parametrize('name', STARTED)
+def test_a_file_that_is_not_there_is_a_sentence(
+    name: str, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(PprsError, match=r'nowhere\.yaml'):
+        described(name, monkeypatch, model='nowhere.yaml')
+
+
+def test_every_launch_file_is_tried() -> None:
+    assert {each.name.partition('.')[0] for each in (PROJECT / 'launch').iterdir()
+            if each.name.endswith('.launch.py')} == STARTED.keys()
