@@ -164,8 +164,11 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
-        samples = Samples.of(state, treat, [effect for effect in self.model.effects
-                                            if isinstance(effect, MeasurementEffect)])
+        slow = samples = Samples.of(state, treat, [effect for effect in self.model.effects
+                                                   if isinstance(effect, MeasurementEffect)])
+        if self.model.robot.structure is None:
+            # The loads of the closed form take less time than an interpolation saves.
+            samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
         before = self._efforts(self.model, samples.nodes)
         columns = {NUMBERS: self._of_numbers(forces, samples, before), OF_DRIVES: samples.treated(
             reversal_columns(self.dry(state), state.velocity, state.direction,
@@ -174,8 +177,7 @@ class Sensitivities:
             columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
         if self.of_zeros:
             columns[HOMING], columns[INERTIA] = map(
-                replace(samples, sensors=[]).interpolated,
-                self._of_misreadings(samples.nodes, before))
+                replace(slow, sensors=[]).interpolated, self._of_misreadings(slow.nodes))
         known = {effect.name for effect in self.given.effects}
         present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
                    if isinstance(effect, StructureEffect) and effect.name in known}
@@ -191,12 +193,13 @@ class Sensitivities:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
         return self.model.friction.dry(state.friction_load)
 
-    def _of_misreadings(self, state: Any, before: Array) -> tuple[list[Array], list[Array]]:
+    def _of_misreadings(self, state: Any) -> tuple[list[Array], list[Array]]:
         """Return the changes per position, and per acceleration, that are measured too much.
 
         Of each drive, (N, D) each.
         """
         step, drives = state.robot.position_step, range(len(self.model.drives))
+        before = self._efforts(self.model, state)
         still = self._at(self.model, state).rigid_force
         return ([(self._efforts(self.model, self._at(self.model, state.perturbed(drive, -step)))
                   - before) / step for drive in drives],
