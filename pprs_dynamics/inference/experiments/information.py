@@ -47,7 +47,6 @@ WEAK = 1e-9  # prior precision of what is free, relative to what is known of it
 # A direction of less information, per scale, is unknown, and so is what has a share in it.
 UNSEEN, WEIGHT = 1e-8, 1e-4
 EVIDENCE_FLOOR = 1.0  # misfits below it count as none
-HOMING_SAMPLES = 100  # of a motion, at which the slow columns of wrong zeros are computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +181,6 @@ class Information:
         block : int
             Samples that are averaged.
         """
-        self._sensitivities.homing_stride = max(1, len(time) // HOMING_SAMPLES)
         return Design.planned(self._sensitivities, forces, time, block)
 
     def prior(self) -> Array:

@@ -300,8 +300,8 @@ class Design:
         """
         s, samples = forces.mechanism, len(time)
         treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
-        stacked = {name: treat(column.transpose(1, 0, 2)).transpose(1, 2, 0)
-                   for name, column in sensitivities.columns(forces).items()}
+        stacked = {name: column.transpose(1, 2, 0)
+                   for name, column in sensitivities.columns(forces, treat).items()}
         full = FullRate(time, s.position, s.velocity, s.acceleration, s.direction, s.friction_load,
                         s.transmitted, forces.total, forces.total, (slice(0, samples),), treat,
                         float(time[0]), {})

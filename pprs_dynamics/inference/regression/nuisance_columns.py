@@ -25,6 +25,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Term
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
+from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
@@ -94,13 +95,13 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
     units = [effect.at({name: 1.0}) for name in names]
     sensors = [effect for effect in model.effects if isinstance(effect, MeasurementEffect)]
 
-    def rows(forces: Any) -> dict[str, Array]:
+    def rows(forces: Any, treat: Treatment) -> dict[str, Array]:
         state = forces.mechanism
         columns = np.stack([passive_reversal_columns(unit, state) for unit in units])
         for sensor in sensors:
             columns = np.stack([[sensor.measured(column, state) for column in one]
                                 for one in columns])
-        return {'rows': columns.transpose(2, 0, 1, 3)}
+        return {'rows': treat(columns.transpose(2, 0, 1, 3))}
 
     stacked = np.concatenate([
         treated_forces(model, reconstruction, more=rows)['rows']

@@ -9,34 +9,33 @@ coefficient, at one chunk of a recording, at full rate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
+from pprs_dynamics.measurement.motion.treatment import Treatment, bandwidth
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import PASSIVE_FRICTION, Forces
 from pprs_dynamics.physics.model.keys import GAIN
-from pprs_dynamics.system.parallel import each
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-BLOCK = 200  # samples whose motion fits into a processor's cache, 10 kB each
-HOMING_TIME = 0.01  # [s]; columns of wrong zeros change slowly between reversals
-SLOWER = 4  # times as slowly do inertias
+NODES_PER_PERIOD = 120  # see `Samples`
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
@@ -120,26 +119,20 @@ class Sensitivities:
     numbers : tuple of Number
     searched : tuple of type of StructureEffect
         Effects outside the drives that the given model could have and has not.
-    each : callable
-        Evaluates columns, in threads where they take long.
     of_zeros : bool
         Whether `HOMING` is computed.
-    homing_stride : int
-        Samples between those at which it is; 0: those within `HOMING_TIME`.
     """
 
     def __init__(self, model: DriveModel, given: DriveModel) -> None:
         self.model, self.given = model, given
-        self.each: Callable[..., Iterable[Any]] = each if model.robot.structure is not None else map
         self.numbers = model_numbers(given)
         present = {effect.name for effect in given.effects}
         self.searched: tuple[type[StructureEffect], ...] = tuple(
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
-        self.of_zeros, self.homing_stride = any(
-            effect.shifts_positions() and given.offers(effect)
-            for effect in catalogue().values()), 0
+        self.of_zeros = any(effect.shifts_positions() and given.offers(effect)
+                            for effect in catalogue().values())
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
@@ -148,8 +141,8 @@ class Sensitivities:
                    for effect in catalogue().values()):
             self.of_zeros = False
 
-    def columns(self, forces: Any) -> dict[str, Array]:
-        """Return columns by name, (K, N, D) each.
+    def columns(self, forces: Any, treat: Treatment) -> dict[str, Array]:
+        """Return treated columns by name, (M, K, D) each.
 
         What a kind of model does not have is missing.
 
@@ -167,73 +160,51 @@ class Sensitivities:
         ----------
         forces : Forces
             Of the model at one chunk, before its sensors.
+        treat : Treatment
+            For its samples.
         """
         state: Any = forces.mechanism
-        reference = self._efforts(self.model, state)
-        columns = {NUMBERS: self._of_numbers(forces, reference), OF_DRIVES: self._sensed_each(
+        slow = samples = Samples.of(state, treat, [effect for effect in self.model.effects
+                                                   if isinstance(effect, MeasurementEffect)])
+        if self.model.robot.structure is None:
+            # The loads of the closed form take less time than an interpolation saves.
+            samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
+        before = self._efforts(self.model, samples.nodes)
+        columns = {NUMBERS: self._of_numbers(forces, samples, before), OF_DRIVES: samples.treated(
             reversal_columns(self.dry(state), state.velocity, state.direction,
-                             np.asarray(self.model.reversal.velocity)), state)}
+                             np.asarray(self.model.reversal.velocity)))}
         for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
-            columns[OF_JOINTS] = self._sensed_each(
-                passive_reversal_columns(friction, state), state)
+            columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
         if self.of_zeros:
-            columns[HOMING], columns[INERTIA] = self._of_misreadings(state)
-        for effect in self.searched:
-            columns[effect.name], bare = self._of_structure(effect, state, reference)
-            if issubclass(effect, BodyEffect):
-                columns[BARE + effect.name] = bare
+            columns[HOMING], columns[INERTIA] = map(
+                replace(slow, sensors=[]).interpolated, self._of_misreadings(slow.nodes))
         known = {effect.name for effect in self.given.effects}
-        for present in self.model.effects:
-            if isinstance(present, StructureEffect) and present.name in known:
-                columns[PRESENT + present.name], bare = self._of_structure(
-                    type(present), state, reference)
-                if isinstance(present, BodyEffect):
-                    columns[BARE + PRESENT + present.name] = bare
+        present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
+                   if isinstance(effect, StructureEffect) and effect.name in known}
+        for name, effect in {**{one.name: one for one in self.searched}, **present}.items():
+            if issubclass(effect, BodyEffect):
+                columns[name], columns[BARE + name] = map(
+                    samples.interpolated, self._of_bodies(effect, samples.nodes, before))
+            else:
+                columns[name] = samples.treated(self._of_forces(effect, state))
         return columns
 
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
         return self.model.friction.dry(state.friction_load)
 
-    def _of_misreadings(self, state: Any) -> tuple[Array, Array]:
+    def _of_misreadings(self, state: Any) -> tuple[list[Array], list[Array]]:
         """Return the changes per position, and per acceleration, that are measured too much.
 
-        Of each drive, (D, N, D) each, evaluated at some samples, straight lines between.
+        Of each drive, (N, D) each.
         """
-        every, stride = np.arange(len(state.velocity)), self.homing_stride
-        if not stride:
-            step = (HOMING_TIME if state.time is None or len(every) < 2
-                    else float(np.median(np.diff(state.time))))
-            stride = max(1, round(HOMING_TIME / step))
-        samples = every[min(stride // 2, len(every) - 1)::stride]
-        there, seldom = state[samples], state[samples[::SLOWER]]
-        step = there.robot.position_step
-
-        def efforts(drive: int, move: float) -> Array:
-            return self._efforts(self.model, self._at(self.model, there.perturbed(drive, move)))
-
-        def column(drive: int) -> Array:
-            change = (efforts(drive, -step) - before) / step
-            return np.stack([np.interp(every, samples, column) for column in change.T], axis=1)
-
-        def inertia(drive: int) -> Array:
-            change = still - self._at(self.model, seldom.accelerated(drive, 1.0)).rigid_force
-            return np.stack([np.interp(every, samples[::SLOWER], column)
-                             for column in change.T], axis=1)
-
-        before, still = efforts(0, 0.0), self._at(self.model, seldom).rigid_force
-        drives = range(len(self.model.drives))
-        return np.stack(list(self.each(column, drives))), np.stack(list(self.each(inertia, drives)))
-
-    def sensed(self, column: Array, state: Any) -> Array:
-        """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
-        for effect in self.model.effects:
-            if isinstance(effect, MeasurementEffect):
-                column = effect.measured(column, state)
-        return column
-
-    def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:
-        return np.stack([self.sensed(column, state) for column in columns])
+        step, drives = state.robot.position_step, range(len(self.model.drives))
+        before = self._efforts(self.model, state)
+        still = self._at(self.model, state).rigid_force
+        return ([(self._efforts(self.model, self._at(self.model, state.perturbed(drive, -step)))
+                  - before) / step for drive in drives],
+                [still - self._at(self.model, state.accelerated(drive, 1.0)).rigid_force
+                 for drive in drives])
 
     def _efforts(self, model: DriveModel, state: Any) -> Array:
         """Return efforts at a state, without effects that know their past."""
@@ -283,80 +254,135 @@ class Sensitivities:
             found[number] = models[place]
         return found
 
-    def _of_numbers(self, forces: Any, reference: Array) -> Array:
-        columns = np.zeros((len(self.numbers), *reference.shape))
+    def _of_numbers(self, forces: Any, samples: Samples, before: Array) -> Array:
+        """Return the columns of all numbers, (M, K, D)."""
+        columns = np.zeros((len(samples.treat), len(self.numbers), len(self.model.drives)))
         changes: dict[int, Array] = {}
         for row, number in enumerate(self.numbers):
-            moved = id(self._moved[number])
-            if moved not in changes:
-                changes[moved] = self._change(number, forces, reference)
+            moved = self._moved[number]
+            if id(moved) not in changes:
+                changes[id(moved)] = self._change(number, moved, forces, samples, before)[:, 0]
             drives = self.drives_of(number) or slice(None)
-            columns[row][:, drives] = (changes[moved][:, drives] * number.deviation
+            columns[:, row, drives] = (changes[id(moved)][:, drives] * number.deviation
                                        / (RELATIVE_STEP * abs(number.value)))
-            columns[row] = self.sensed(columns[row], forces.mechanism)
         return columns
 
-    def _change(self, number: Number, forces: Any, reference: Array) -> Array:
-        """Return what a number moved by `RELATIVE_STEP` of itself changes, (N, D)."""
-        moved, state = self._moved[number], forces.mechanism
+    def _change(self, number: Number, moved: DriveModel, forces: Any, samples: Samples,
+                before: Array) -> Array:
+        """Return what a number moved by `RELATIVE_STEP` of itself changes, (M, 1, D)."""
+        state = forces.mechanism
         if number.key == GAIN:
             # The more torque an ampere gives, the fewer amperes the model's torque takes.
             given = np.asarray(self.given.values[number.key])
-            return np.asarray(-forces.total * RELATIVE_STEP * given / self.model.gain)
+            return samples.treated([-forces.total * RELATIVE_STEP * given / self.model.gain])
         if number.key.startswith('friction.'):
-            return self._efforts(moved, state.with_smoothing(moved.reversal)) - reference
-        if number.key.startswith('geometry.'):
-            state = moved.at_drives(state)
-        return self._efforts(moved, self._at(moved, state)) - reference
+            found = state.with_smoothing(moved.reversal)
+        elif number.key.startswith('geometry.'):  # with it friction turns over at other times
+            found = self._at(moved, moved.at_drives(state))
+        else:
+            found = self._at(moved, samples.nodes)
+            return samples.interpolated([self._efforts(moved, found) - before])
+        return samples.treated([self._efforts(moved, found) - self._efforts(self.model, state)])
 
-    def _of_structure(self, effect: type[StructureEffect], state: Any, reference: Array,
-                      ) -> tuple[Array, Array]:
-        """Return columns per unit of each coefficient, around values that the model has.
+    def _present(self, effect: type[StructureEffect]) -> StructureEffect | None:
+        """Return an effect as the model has it."""
+        return next((one for one in self.model.effects if one.name == effect.name
+                     and isinstance(one, StructureEffect)), None)
 
-        Block by block: all coefficients read the same motion, which the cache then holds.
+    def _of_forces(self, effect: type[StructureEffect], state: Any) -> list[Array]:
+        """Return columns of an effect that adds forces, per unit of each coefficient.
+
+        Around the values that the model has.
+        """
+        present = self._present(effect)
+        values = {} if present is None else effect.to_coefficients(present.values)
+        before = (effect.at(values) if present is None else present).force(state)
+        return [(effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale}).force(state)
+                 - before) / c.scale for c in effect.coefficients]
+
+    def _of_bodies(self, effect: type[BodyEffect], state: Any, before: Array,
+                   ) -> tuple[list[Array], list[Array]]:
+        """Return columns of an effect on bodies, per unit of each coefficient.
 
         As the model says, and as they would be if friction did not follow the loads that the
-        effect adds (a preloaded guide). Those of bodies are around none: `AddedBody.around` makes
-        them exact for where one is.
+        effect adds (a preloaded guide). Around the values that the model has, but those of added
+        bodies are around none: `AddedBody.around` makes them exact for where one is.
         """
-        present = next((one for one in self.model.effects if one.name == effect.name
-                        and isinstance(one, StructureEffect)), None)
+        present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
-        values = effect.to_coefficients(present.values) if present is not None else {}
+        values = {} if present is None else effect.to_coefficients(present.values)
+        full, bare = [], []
+        for c in effect.coefficients:
+            moved = effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
+            found = moved.apply(state) if present is None else self._at(replace(
+                self.model, effects=tuple(moved if one is present else one
+                                          for one in self.model.effects)), state)
+            full.append((self._efforts(self.model, found) - before) / c.scale)
+            bare.append((found.rigid_force - state.rigid_force) / c.scale)
+        return full, bare
 
-        def of_block(rows: slice) -> tuple[list[Array], list[Array]]:
-            part = self._part(state, rows)
-            before = (None if issubclass(effect, BodyEffect)
-                      else (effect.at(values) if present is None else present).force(part))
 
-            def change(coefficient: Parameter) -> tuple[Array, Array]:
-                step = coefficient.scale
-                moved: Any = effect.at({**values, coefficient.name:
-                                        values.get(coefficient.name, 0.0) + step})
-                if before is not None:
-                    more = (moved.force(part) - before) / step
-                    return more, more
-                found = moved.apply(part) if present is None else self._at(replace(
-                    self.model, effects=tuple(moved if effect is present else effect
-                                              for effect in self.model.effects)), part)
-                return ((self._efforts(self.model, found) - reference[rows]) / step,
-                        (found.rigid_force - part.rigid_force) / step)
+@dataclass(frozen=True)
+class Samples:
+    """A chunk of a motion, and the samples of it at which slow columns are evaluated.
 
-            full, bare = zip(*map(change, effect.coefficients), strict=True)
-            return list(full), list(bare)
+    Columns of bodies follow the motion: `NODES_PER_PERIOD` and cubic splines represent them.
+    Friction turns over within a few samples.
 
-        size = BLOCK if self.model.robot.structure is not None else len(reference)
-        full, bare = (np.concatenate(blocks, axis=1) for blocks in zip(*self.each(
-            of_block, (slice(first, first + size) for first in range(0, len(reference), size))),
-            strict=True))
-        return self._sensed_each(full, state), self._sensed_each(bare, state)
+    Parameters
+    ----------
+    state : MechanismState
+        Of all N samples.
+    treat : Treatment
+        For these.
+    sensors : list of MeasurementEffect
+        Through which columns are seen.
+    at : (S,) int array
+        The nodes.
+    nodes : MechanismState
+        There.
+    """
 
-    @staticmethod
-    def _part(state: Any, rows: slice) -> Any:
-        """Return some samples of a motion, with their kinematics as they are known."""
-        return replace(state[rows], known=state.links.part(rows)) if isinstance(
-            state.links, LinkMotion) else state
+    state: Any
+    treat: Treatment
+    sensors: Sequence[MeasurementEffect]
+    at: np.typing.NDArray[np.int_]
+    nodes: Any
+
+    @classmethod
+    def of(cls, state: Any, treat: Treatment, sensors: Sequence[MeasurementEffect]) -> Samples:
+        """Return the samples of a motion, with as many nodes as it needs."""
+        count = len(state.velocity)
+        period = min(1 / max(bandwidth(state.acceleration), 1e-300), count)
+        stride = int(period / NODES_PER_PERIOD)
+        if stride < 2:
+            return cls(state, treat, sensors, np.arange(count), state)
+        at = np.round(np.linspace(0, count - 1, -(-(count - 1) // stride) + 1)).astype(int)
+        links = state.links
+        known = LinkMotion(links.structure, links.rows[at]) if isinstance(
+            links, LinkMotion) else None
+        return cls(state, treat, sensors, at, replace(state[at], known=known))
+
+    def treated(self, columns: Sequence[Array]) -> Array:
+        """Return columns (N, D) as sensors show them, treated, (M, K, D)."""
+        if not len(columns):
+            return np.zeros((len(self.treat), 0, self.state.velocity.shape[1]))
+        for sensor in self.sensors:
+            columns = [sensor.measured(column, self.state) for column in columns]
+        return self.treat(np.stack(columns, axis=1))
+
+    def interpolated(self, columns: Sequence[Array]) -> Array:
+        """Return columns (S, D) at the nodes likewise."""
+        if self.nodes is self.state:
+            return self.treated(columns)
+        spline = make_interp_spline(self.at, np.stack(columns, axis=1))
+        weights = BSpline.design_matrix(np.arange(len(self.state.velocity)), spline.t, spline.k)
+        if not self.sensors:
+            weights = self.treat.matrix @ weights
+        found: Array = np.asarray(weights @ spline.c.reshape(len(self.at), -1))
+        found = found.reshape(-1, *spline.c.shape[1:])
+        return self.treated([*found.swapaxes(0, 1)]) if self.sensors else found
 
 
 def following(model: DriveModel) -> list[Effect]:
@@ -415,7 +441,7 @@ def stacked_columns(tables: list[dict[Any, Array]]) -> dict[str, Array]:
 
 
 class ColumnCollector:
-    """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
+    """Called chunk by chunk: returns treated columns, and stores what drives did."""
 
     def __init__(self, sensitivities: Sensitivities, reconstruction: Reconstruction) -> None:
         self.sensitivities = sensitivities
@@ -428,17 +454,15 @@ class ColumnCollector:
                         if isinstance(effect, MeasurementEffect)]
         self.kept: list[tuple[Array, ...]] = []
 
-    def __call__(self, forces: Forces) -> dict[Column, Array]:
+    def __call__(self, forces: Forces, treat: Treatment) -> dict[Column, Array]:
         s: Any = forces.mechanism
         effort = forces.total - sum((forces.parts[name] for name in self.sensors),
                                     np.zeros_like(forces.total))
         self.kept.append((s.velocity, s.acceleration, s.direction, s.friction_load,
                           s.transmitted, effort))
-        columns = self.sensitivities.columns(forces)
-        columns[NUMBERS][self.without_gain] = 0.0
-        # Views: copies of all columns at full rate would take longer than their means.
-        return {Column(name): (column if np.all(self.share == 1) else self.share * column)
-                .transpose(1, 0, 2) for name, column in columns.items()}
+        columns = self.sensitivities.columns(forces, treat)
+        columns[NUMBERS][:, self.without_gain] = 0.0
+        return {Column(name): self.share * column for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
         """Return what the drives did, with positions as the mechanism has them."""

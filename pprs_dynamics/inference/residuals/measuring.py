@@ -20,6 +20,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Between recordings [s], so that times of all together increase.
@@ -80,7 +81,7 @@ def measure_residuals(
 def treated_table(
     model: DriveModel, reconstruction: Reconstruction,
     progress: Callable[[int, int], None] | None = None,
-    more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
+    more: Callable[[Any, Treatment], Mapping[Any, Array]] = lambda forces, treat: {},
 ) -> dict[Any, Array]:
     """Return all that a comparison needs of one recording, treated, by name.
 
@@ -90,15 +91,14 @@ def treated_table(
     reconstruction : Reconstruction
     progress : callable, optional
     more : callable, optional
-        Gives further quantities to be treated, see `treated_forces`.
+        Returns further quantities, see `treated_forces`.
     """
-    def variables(forces: Any) -> dict[Variable, Array]:
-        return {Variable(name): values
-                for name, values in model.robot.variables(forces.mechanism).items()}
+    def with_variables(forces: Any, treat: Treatment) -> dict[Any, Array]:
+        return {**{Variable(name): treat(values) for name, values
+                   in model.robot.variables(forces.mechanism).items()}, **more(forces, treat)}
 
     treat = reconstruction.treat
-    table = treated_forces(model, reconstruction, progress,
-                           lambda forces: {**variables(forces), **more(forces)})
+    table = treated_forces(model, reconstruction, progress, with_variables)
     table['measured'] = treat(reconstruction.effort)
     table['time'] = treat(reconstruction.time)
     for name in MOTION:

@@ -368,7 +368,7 @@ def sensed_forces(
 
 def treated_forces(
     model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
-    more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
+    more: Callable[[Any, Treatment], Mapping[Any, Array]] = lambda forces, treat: {},
 ) -> dict[Any, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
 
@@ -379,8 +379,8 @@ def treated_forces(
     progress : callable, optional
         Called with (samples done, all) now and then.
     more : callable, optional
-        Gives further quantities of the same evaluation, from what `drive_forces` of the model
-        returns, to be treated, (N, ...) each, by name.
+        Returns further quantities of the same evaluation by name, (M, ...) each, from what
+        `drive_forces` of the model returns, and the treatment for its samples.
 
     Raises
     ------
@@ -389,10 +389,11 @@ def treated_forces(
     """
     treated: dict[Any, Array] = {}
     for chunk, forces, efforts in sensed_forces(model, reconstruction):
-        for name, values in {**efforts, **more(forces)}.items():
+        means = {name: chunk.treat(values) for name, values in efforts.items()}
+        for name, values in {**means, **more(forces, chunk.treat)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), *values.shape[1:]))
-            treated[name][chunk.blocks] = chunk.treat(values)
+            treated[name][chunk.blocks] = values
         if progress is not None:
             progress(chunk.samples.stop, len(reconstruction))
     return treated

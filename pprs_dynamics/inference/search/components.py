@@ -165,12 +165,21 @@ class Components:
         self._nuisance: dict[Component, Mapping[str, dict[int, Array]]] = {}
         self._prior_costs: dict[Component, CostTerms] = {}
         self.local = {d: DriveComponents(design, regression, d) for d in regression.drives}
-        self.spanning = [placed(design, effect, d, shape, names)
-                         for effect in searched_in_drives(design) if effect.shifts_positions()
-                         for d in regression.drives if design.acts_on(effect, d)
-                         for shape in shapes_of(design, effect, d) for names in effect.variants]
-        self.structure = [self._placed(term, names) for term in design.structure
-                          for names in term.variants()]
+
+    @cached_property
+    def structure(self) -> list[Component]:
+        """Effects outside the drives, as additions."""
+        return [self._placed(term, names) for term in self.design.structure
+                for names in term.variants()]
+
+    @cached_property
+    def spanning(self) -> list[Component]:
+        """Effects on a drive that all drives feel, as additions."""
+        design = self.design
+        return [placed(design, effect, d, shape, names)
+                for effect in searched_in_drives(design) if effect.shifts_positions()
+                for d in self.regression.drives if design.acts_on(effect, d)
+                for shape in shapes_of(design, effect, d) for names in effect.variants]
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Component:
         """Return an effect in the structure, a body where it is most likely to be."""

@@ -339,11 +339,20 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
 
 
 def _with_exact_best(table: ModelTable) -> ModelTable:
-    """Return a table in which the rows that may be the best have exact costs."""
+    """Return a table in which the rows that may be the best have exact costs.
+
+    Those within the margin of rivals, and the best row without one of its effects: around the
+    model of a nonlinear set the linear cost of a smaller one says little.
+    """
     margin, table = table.last.decisions.rival_margin, replace(table)
     for _ in range(MOST_EXACT):
-        row = next((row for row in table.rows if not row.is_exact
-                    and row.cost < table.best.cost + margin), None)
+        best = table.best
+        near = [row for row in table.rows if row.cost < best.cost + margin]
+        if best.fitted.is_nonlinear and not best.fitted.is_dated and len(best.effects) > 1:
+            near += [Row(best.fits, best.fits.evaluate(best.fitted.without(effect)))
+                     for effect in best.effects]
+        row = next((row for row in near if not row.is_exact
+                    and row.fitted.row_key not in table.exact), None)
         if row is None:
             break
         table = replace(table, exact={**table.exact,

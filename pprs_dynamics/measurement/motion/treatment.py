@@ -15,6 +15,8 @@ gear: blocks follow the motion there, as the model says.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -30,21 +32,23 @@ def motion_bandwidth(stretches: Sequence[Stretch], smoothing: Smoothing) -> floa
 
     Every drive counts alike, however far it moves; infinite where none moves.
     """
-    bandwidth = 0.0
+    highest = 0.0
     for position, step, _ in stretches:
         filter_ = smoothing.polynomial(step)
-        if len(position) < 2 * filter_.window:
-            continue
-        acceleration = filter_.filtered(position, 2)
-        window = np.hanning(len(acceleration))[:, None]
-        power = np.abs(np.fft.rfft((acceleration - acceleration.mean(axis=0)) * window,
-                                   axis=0)) ** 2
-        total = power.sum(axis=0)
-        if np.any(total > 0):
-            shares: Array = np.cumsum((power[:, total > 0] / total[total > 0]).mean(axis=1))
-            at = int(np.searchsorted(shares, SHARE))
-            bandwidth = max(bandwidth, at / (len(acceleration) * step))
-    return bandwidth or float('inf')
+        if len(position) >= 2 * filter_.window:
+            highest = max(highest, bandwidth(filter_.filtered(position, 2)) / step)
+    return highest or float('inf')
+
+
+def bandwidth(acceleration: Array) -> float:
+    """Return the same of accelerations (N, D) [1 / sample]; 0 where no drive moves."""
+    window = np.hanning(len(acceleration))[:, None]
+    power = np.abs(np.fft.rfft((acceleration - acceleration.mean(axis=0)) * window, axis=0)) ** 2
+    total = power.sum(axis=0)
+    if not np.any(total > 0):
+        return 0.0
+    shares: Array = np.cumsum((power[:, total > 0] / total[total > 0]).mean(axis=1))
+    return int(np.searchsorted(shares, SHARE)) / len(acceleration)
 
 
 def block_duration(bandwidth: float, blocks_per_period: float) -> float:
@@ -95,6 +99,15 @@ class Treatment:
             raise ValueError(f'{len(values)} samples for a treatment of {self.samples}')
         sums = np.add.reduceat(values, self.starts, axis=0)
         return sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
+
+    @cached_property
+    def matrix(self) -> Any:
+        """The same as a sparse matrix, (M, N)."""
+        from scipy.sparse import csr_array
+
+        edges = np.append(self.starts, self.samples)
+        return csr_array((np.repeat(1 / self._counts, self._counts), np.arange(self.samples),
+                          edges), shape=(len(self), self.samples))
 
     def blocks(self, first: int, last: int) -> Treatment:
         """Return the treatment of blocks first..last-1 alone, for their samples alone."""
