@@ -107,11 +107,6 @@ class Mechanism:
         """`gravity` as an array."""
         return np.array(self.gravity, dtype=float)
 
-    @property
-    def numbers(self) -> Array:
-        """All numbers besides the structure that determine efforts, in one row."""
-        return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
-
     @cached_property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """Joints and rotating loops without a drive."""

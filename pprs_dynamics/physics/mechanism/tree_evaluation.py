@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,27 +61,23 @@ NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-class InverseDynamicsResult:
-    """Closed coordinates and drive efforts of N samples.
+class InverseDynamicsResult(NamedTuple):
+    """Drive efforts of N samples, and closed coordinates of robots without a closed form.
 
     Parameters
     ----------
-    q : (N, C) array
+    q : (N, C) array or None
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
-        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
-    motion : three (N, D) arrays
-        Position, velocity and acceleration of the drives.
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
+        `closed_form` for the other rows of a 3-PPRS.
+    motion : three (N, D) arrays, or None
+        Position, velocity and acceleration of the drives, where they are known.
     """
 
-    __slots__ = ('efforts', 'motion', 'q')
-
-    def __init__(self, q: Array, efforts: Array, motion: tuple[Array, Array, Array]) -> None:
-        self.q, self.efforts, self.motion = q, efforts, motion
-
-    def drive_motion(self) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration of the drives."""
-        return self.motion
+    q: Any
+    efforts: Array
+    motion: Any
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,

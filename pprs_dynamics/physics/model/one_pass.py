@@ -76,7 +76,7 @@ class OnePass:
         return None if found is None else Forces(
             found.efforts[TOTAL], lambda: self._parts(found.efforts),
             lambda: robot.state(motion, self._reversal, self._joints, found=found),
-            found.drive_motion)
+            found.motion)
 
     def _parts(self, efforts: Array) -> dict[str, Array]:
         """Return the parts of efforts by name, in the order of the effects."""

@@ -20,8 +20,12 @@ from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
-from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, SPHERICAL
-from pprs_dynamics.physics.three_pprs.robot import SingularityBounds, ThreePprs
+from pprs_dynamics.physics.three_pprs.robot import (
+    REVOLUTE,
+    SPHERICAL,
+    SingularityBounds,
+    ThreePprs,
+)
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
 

@@ -6,14 +6,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
 
 ELBOWS = ('up', 'down')
 
@@ -55,30 +53,6 @@ class Geometry:
     def elbow_sign(self) -> float:
         """Sign of sin u_i."""
         return 1.0 if self.elbow == 'up' else -1.0
-
-    @cached_property
-    def cos(self) -> Array:
-        """Cosines of the chain angles, (3,)."""
-        return np.cos(self.chain_angles)
-
-    @cached_property
-    def sin(self) -> Array:
-        """Sines of the chain angles, (3,)."""
-        return np.sin(self.chain_angles)
-
-    @cached_property
-    def kernel_parameters(self) -> GeometryParameters:
-        """Lengths and the constants of the chains."""
-        delta = np.asarray(self.chain_angles)
-        joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
-        left = np.linalg.pinv(np.stack((-self.sin, self.cos), axis=1))
-        # The weights with which the three directions n_i add up to nothing.
-        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
-        constants = np.stack((self.cos, self.sin, joints.real, joints.imag, *left, balance),
-                             axis=1).tolist()
-        first, second, third = (Chain(*chain) for chain in constants)
-        return GeometryParameters(self.base_radius, self.rod_length, self.elbow_sign,
-                                  (first, second, third))
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.vectors import Vector, in_chain
-from pprs_dynamics.physics.three_pprs.passive_joints import relative_rate
 
 
 class IndependentChainsFriction(ModelJointFriction):
@@ -67,12 +65,12 @@ class IndependentChainsFriction(ModelJointFriction):
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
         found, robot = state.reactions, state.reactions.robot
         k_r, k_s = found.resistances(self.table(robot, state.reversal))
-        omega_n = relative_rate(found.u_dot, in_chain(robot.geometry, Vector(
-            *state.motion.angular_velocity.T[..., None])))
+        omega, delta = state.motion.angular_velocity, np.asarray(robot.geometry.chain_angles)
+        along_axis = omega[:, 1:2] * np.cos(delta) - omega[:, :1] * np.sin(delta)
         lever = robot.geometry.rod_length * found.cos_u
         sign = -1.0 if robot.printed else 1.0
-        M_s_up, M_s_n = -k_s * omega_n.k, -k_s * omega_n.n                     # Eq. (9)
-        M_r_n = -k_r * found.u_dot                                            # Eq. (9)
+        M_s_up, M_s_n = k_s * omega[:, 2:], -k_s * (found.u_dot - along_axis)  # Eq. (9)
+        M_r_n = -k_r * found.u_dot                                             # Eq. (9)
         slides = sign * M_s_up / lever                                         # Eq. (13)
         lifts = sign * (M_s_n + M_r_n) / lever                                 # Eq. (13)
         return np.concatenate((slides, lifts), axis=1)
