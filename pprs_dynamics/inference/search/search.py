@@ -133,9 +133,13 @@ class Search:
         for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
             if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
-        # A scan puts it where each drive pays by itself: with others that is seldom right.
+        # A scan puts it where each drive pays by itself: with others that is seldom right. What an
+        # effect stood for may be superfluous once another is in its place.
+        margin = self.fits.decisions.rival_margin
+        near = sorted((fitted for fitted in new if fitted.cost < self.best.cost + margin),
+                      key=lambda fitted: fitted.cost)[:REFINED]
         for fitted in new:
-            if len(fitted.candidates) == len(fitted.effects) == 1:
+            if len(fitted.candidates) == len(fitted.effects) == 1 or fitted in near:
                 simplified(self.fits, fitted)
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
@@ -194,6 +198,10 @@ class Search:
                 yield exchanged(best, candidate, shaped)
             if len(candidate.components) > 1:
                 yield from self._divided(best, candidate)
+            if len(candidate.hypotheses) > 1:  # two effects may be what it is
+                base = self.fits.at_noise_of(best, best.without(candidate))
+                for part in self.scan.proposals(base, REPLACEMENTS):
+                    yield from self._instead(best, part, REPLACEMENTS)
 
     def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
         """Yield a set with other effects on one drive of an effect, and on all of its drives.
