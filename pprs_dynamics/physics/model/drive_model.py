@@ -29,7 +29,10 @@ from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -73,7 +76,6 @@ from pprs_dynamics.physics.model.recorded_names import (
     recorded_columns,
 )
 from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform, require_drives
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 
 OWN = DriveFriction, DriveOffset, ModelJointFriction  # effects that the one pass evaluates
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.

@@ -17,7 +17,10 @@ from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.mechanism.description import (
     REVOLUTE,
     Description,
@@ -35,7 +38,6 @@ from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs import robot as three_pprs
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.system.package_files import located
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
