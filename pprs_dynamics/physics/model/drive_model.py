@@ -75,7 +75,7 @@ from pprs_dynamics.physics.model.recorded_names import (
     joint_names,
     recorded_columns,
 )
-from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform, require_drives
+from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform
 
 OWN = DriveFriction, DriveOffset, ModelJointFriction  # effects that the one pass evaluates
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
@@ -145,7 +145,6 @@ class DriveModel:
             For a key that is unknown, missing, of the wrong type or impossible.
         """
         with source_of_errors(source):
-            require_drives(parameters)
             values = checked_values(parameters)
             robot: Any
             robot, own, reversal, limits = (

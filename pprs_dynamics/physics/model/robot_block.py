@@ -92,12 +92,6 @@ FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
 TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
-def require_drives(parameters: Mapping[str, Any]) -> None:
-    """Raise ModelError for an empty list of drives, before keys of their number are checked."""
-    if DRIVES_KEY in parameters and not parameters[DRIVES_KEY]:
-        raise ModelError(DRIVES_KEY, parameters[DRIVES_KEY], 'name at least one joint')
-
-
 def read_mechanism(values: dict[str, Any], folder: Path,
                    ) -> tuple[Mechanism, tuple[Effect, ...], Reversal, DriveLimits]:
     """Return a mechanism, its own friction, its smoothing and limits.
@@ -256,12 +250,6 @@ def described_gravity(structure: Structure) -> tuple[float, ...]:
     return tuple(float(each) for each in turned)
 
 
-def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
-    """Return the radii at which loads of joints rub, where the file has them [m]."""
-    return {name: block['radius'] for name, block in _blocks_below(values, JOINTS).items()
-            if block['radius']}
-
-
 def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
     """Return the turns of motors per turn of each drive, of those that the file names.
 
@@ -324,7 +312,9 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
-                      gravity_in_efforts(values, 'robot.gravity'), joint_radii(values),
+                      gravity_in_efforts(values, 'robot.gravity'),
+                      {name: block['radius'] for name, block in
+                       _blocks_below(values, JOINTS).items() if block['radius']},
                       motor_map(structure, values))
     _require_driven_bodies(robot)
     return robot
