@@ -24,7 +24,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSerie
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
-from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, RODS
+from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,

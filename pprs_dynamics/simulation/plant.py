@@ -25,7 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
-from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.engine import MechanismEngine

@@ -15,8 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
-from pprs_dynamics.physics.mechanism.tree_tables import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     ANGLE,
     AXES,
     KIND,
@@ -26,6 +25,7 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     Integers,
     Model,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]

@@ -21,9 +21,8 @@ from pprs_dynamics.physics.mechanism.motion_checks import (
     checked_times,
     normalised,
 )
-from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
-from pprs_dynamics.physics.mechanism.vectors import sqrt
+from pprs_dynamics.physics.mechanism.vectors import rotation_matrix, sqrt
 
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')

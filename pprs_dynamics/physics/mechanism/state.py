@@ -17,8 +17,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
-from pprs_dynamics.physics.mechanism.tree_tables import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.system.parallel import lazy
 
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.

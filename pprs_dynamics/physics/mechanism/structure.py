@@ -40,9 +40,9 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
     moved_along,
 )
-from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
+from pprs_dynamics.physics.mechanism.tree_equations import OF_CLOSURE, TRANSLATION, Integers, Model
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
-from pprs_dynamics.physics.mechanism.tree_tables import OF_CLOSURE, TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size

@@ -31,7 +31,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
-from pprs_dynamics.physics.mechanism.tree_tables import Integers
+from pprs_dynamics.physics.mechanism.tree_equations import Integers
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them

@@ -28,7 +28,6 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.effects_block import UNCERTAINTIES
 from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, Key, as_list, keys_of
 from pprs_dynamics.physics.model.ledger import BLOCK
 from pprs_dynamics.physics.model.parameter_file import (
@@ -37,9 +36,10 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
+from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.system.bounded_yaml import check_size, parse
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.package_files import located
 
 WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is people's

@@ -22,15 +22,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.evaluation import reader_of
-from pprs_dynamics.physics.mechanism.motion_sample import (
-    MotionSample,
-    motion_sample,
-    turned,
-    turned_back,
-    vector,
-)
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
-from pprs_dynamics.physics.mechanism.tree_tables import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     DRIVE_FRICTION,
     JOINT_EFFORT,
     RIGID,
@@ -38,14 +31,19 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     elements,
 )
 from pprs_dynamics.physics.mechanism.vectors import (
+    MotionSample,
     Vector,
     combine,
     dot,
     minus,
+    motion_sample,
     plus,
     product,
     sqrt,
     times,
+    turned,
+    turned_back,
+    vector,
 )
 
 CHAINS = 3

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from typing import Any, ClassVar, NamedTuple
@@ -31,14 +31,14 @@ from pprs_dynamics.physics.mechanism.state import (
     PassiveJoint,
     StructureLoad,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
-from pprs_dynamics.physics.mechanism.tree_tables import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     COEFFICIENT,
     JOINT_EFFORT,
     RIGID,
     VISCOUS,
     WIDTH,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
 from pprs_dynamics.physics.three_pprs.closed_form import (
@@ -49,8 +49,13 @@ from pprs_dynamics.physics.three_pprs.closed_form import (
     Joints,
     Parameters,
 )
-from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.tree import HOME_HEIGHT, structure_of, tree_structure
+from pprs_dynamics.physics.three_pprs.geometry import (
+    HOME_HEIGHT,
+    Geometry,
+    Masses,
+    structure_of,
+    tree_structure,
+)
 
 REVOLUTE, SPHERICAL, RODS = 'revolute', 'spherical', 'rods'  # the joints C_i and A_i, and the rods
 POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
@@ -223,7 +228,7 @@ class ThreePprs:
     masses : Masses
     gravity : 3 floats
         Gravity acceleration in `base` [m/s^2].
-    radii : 2 floats
+    radii : mapping of str to float
         At which loads of C_i and A_i rub [m], where known.
     bounds : SingularityBounds
     printed : bool
@@ -233,7 +238,7 @@ class ThreePprs:
     geometry: Geometry
     masses: Masses
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-    radii: tuple[float, float] = (0.0, 0.0)
+    radii: Mapping[str, float] = field(default_factory=dict)
     bounds: SingularityBounds = UNBOUNDED
     printed: bool = False
 
@@ -249,9 +254,8 @@ class ThreePprs:
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """The joints C_i, and the joints A_i."""
-        revolute, spherical = self.radii
-        return (PassiveJoint(REVOLUTE, revolute),
-                PassiveJoint(SPHERICAL, spherical, has_position=False))
+        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE)
+                     for name in (REVOLUTE, SPHERICAL))
 
     @property
     def tool_place(self) -> BodyPlace:

@@ -16,14 +16,18 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.simulation.export.exported_robot import FREE, HINGE, SLIDE, Body, ExportedRobot
-from pprs_dynamics.simulation.export.expressed import (
+from pprs_dynamics.simulation.export.exported_robot import (
     ARMATURE,
     DAMPING,
+    FREE,
     FRICTION,
+    HINGE,
     MJCF,
+    SLIDE,
     SPRINGREF,
     STIFFNESS,
+    Body,
+    ExportedRobot,
 )
 
 THICKNESS = 0.02  # of the mechanism's size, of what is drawn
