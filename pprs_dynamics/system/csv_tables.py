@@ -14,8 +14,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.input_files import require_file
-from pprs_dynamics.system.output_files import new_file
+from pprs_dynamics.system.files import new_file, require_file
 
 ROWS = 10_000  # written at a time
 

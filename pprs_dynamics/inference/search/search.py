@@ -133,9 +133,13 @@ class Search:
         for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
             if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
-        # A scan puts it where each drive pays by itself: with others that is seldom right.
+        # A scan puts it where each drive pays by itself: with others that is seldom right. What an
+        # effect stood for may be superfluous once another is in its place.
+        margin = self.fits.decisions.rival_margin
+        near = sorted((fitted for fitted in new if fitted.cost < self.best.cost + margin),
+                      key=lambda fitted: fitted.cost)[:REFINED]
         for fitted in new:
-            if len(fitted.candidates) == len(fitted.effects) == 1:
+            if len(fitted.candidates) == len(fitted.effects) == 1 or fitted in near:
                 simplified(self.fits, fitted)
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
@@ -192,12 +196,35 @@ class Search:
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
+            if len(candidate.components) > 1:
+                yield from self._divided(best, candidate)
+            if len(candidate.hypotheses) > 1:  # two effects may be what it is
+                base = self.fits.at_noise_of(best, best.without(candidate))
+                for part in self.scan.proposals(base, REPLACEMENTS):
+                    yield from self._instead(best, part, REPLACEMENTS)
+
+    def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
+        """Yield a set with other effects on one drive of an effect, and on all of its drives.
+
+        One flexible effect on two drives costs less than two effects until both are replaced.
+        """
+        divided = best.without(candidate)
+        for component in candidate.components:
+            rest = exchanged(best, candidate, with_instead(candidate, component))
+            found = self._instead(best, rest, REPLACEMENTS, component.drive)
+            yield from found
+            known = {component for c in rest for component in c.components}
+            new = [other for c in found[0] for other in c.components if other not in known
+                   ] if found else [component]
+            divided = joined(divided, new)
+        yield divided
 
     def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
-                 ) -> list[Candidates]:
+                 drive: int | None = None) -> list[Candidates]:
         """Return a part of a set with an effect that makes good most of what it lacks."""
         base = self.fits.at_noise_of(best, rest)
-        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED)
+        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
+                                   drive)
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate in the shapes that its own is easily taken for."""
@@ -224,6 +251,16 @@ def with_instead(candidate: EffectCandidate, gone: Component, *instead: Componen
     return EffectCandidate.of([*(component for component in candidate.components
                                  if component is not gone),
                                *instead])
+
+
+def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:
+    """Return candidates with more components, each in the candidate of its effect if there is."""
+    for component in components:
+        old = next((c for c in candidates if isinstance(c, EffectCandidate)
+                    and c.effect is component.effect and c.course == component.course), None)
+        candidates = (*(c for c in candidates if c is not old),
+                      EffectCandidate.of([*(old.components if old else ()), component]))
+    return candidates
 
 
 def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidates:

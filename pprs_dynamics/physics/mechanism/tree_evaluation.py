@@ -10,28 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
-    WARM_STEPS,
-    actuator_efforts,
-    close_loops,
-    constraint_forces,
-    forward_kinematics,
-    inverse_dynamics,
-    is_near,
-    is_regular_and_closed,
-    jacobian,
-    joint_friction,
-    predict,
-    residual,
-    update_frame_placements,
-)
-from pprs_dynamics.physics.mechanism.tree_tables import (
     EFFORTS,
     FORCE,
     JOINT_EFFORT,
@@ -39,18 +24,31 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     OF_DRIVE,
     STEPS,
     TRANSMITTED,
+    WARM_STEPS,
     WIDTH,
     Data,
     Integers,
     JointFriction,
     Loads,
     Model,
+    actuator_efforts,
+    close_loops,
+    constraint_forces,
     elements,
+    forward_kinematics,
+    inverse_dynamics,
+    is_near,
+    is_regular_and_closed,
+    jacobian,
+    joint_friction,
     length_of,
     packed_tables,
+    predict,
     read_loads,
     read_motion,
     read_tables,
+    residual,
+    update_frame_placements,
     views,
 )
 
@@ -61,27 +59,23 @@ NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-class InverseDynamicsResult:
-    """Closed coordinates and drive efforts of N samples.
+class InverseDynamicsResult(NamedTuple):
+    """Drive efforts of N samples, and closed coordinates of robots without a closed form.
 
     Parameters
     ----------
-    q : (N, C) array
+    q : (N, C) array or None
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
-        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
-    motion : three (N, D) arrays
-        Position, velocity and acceleration of the drives.
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
+        `closed_form` for the other rows of a 3-PPRS.
+    motion : three (N, D) arrays, or None
+        Position, velocity and acceleration of the drives, where they are known.
     """
 
-    __slots__ = ('efforts', 'motion', 'q')
-
-    def __init__(self, q: Array, efforts: Array, motion: tuple[Array, Array, Array]) -> None:
-        self.q, self.efforts, self.motion = q, efforts, motion
-
-    def drive_motion(self) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration of the drives."""
-        return self.motion
+    q: Any
+    efforts: Array
+    motion: Any
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
