@@ -176,9 +176,9 @@ class Plant(Injecting):
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.injected: list[dict[str, Any]] = []
         try:
-            for self.choice in chosen:
+            for choice in chosen:
                 self.injected.append(self.inject_one(
-                    BODIES.get(self.choice.name, Plant._push)))
+                    choice, BODIES.get(choice.name, Plant._push)))
         finally:
             self.engine.data.qpos[:] = kept
 

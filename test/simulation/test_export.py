@@ -26,9 +26,9 @@ from pprs_dynamics.simulation.export.exported_robot import (
     TreePositions,
     export_robot,
     express,
+    written,
 )
 from pprs_dynamics.simulation.export.replay import DURATION, replay
-from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.simulation.injection import draw_motion
 
 EXACT = 1e-9  # of the largest effort

@@ -63,7 +63,9 @@ FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
         'mounting': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
-        'drive_constant': 10.0}
+        'drive_constant': 10.0, 'load': 1.0}
+# Loads at the tool, as shares of the mass that the robot moves.
+LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
@@ -190,6 +192,8 @@ class Reading:
         Recorded columns of the drives' positions and efforts.
     gravity : (3,) array, optional
         Direction of gravity in the base, if it is not the model's.
+    load : float
+        At the tool, beyond the model's [kg].
     """
 
     kind: str
@@ -201,6 +205,7 @@ class Reading:
     positions: Indices
     efforts: Indices
     gravity: Array | None = None
+    load: float = 0.0
 
     def changed(self, kind: str, what: str, drives: tuple[int, ...], cost: float, **more: Any,
                 ) -> Reading:

@@ -29,7 +29,10 @@ from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -72,8 +75,7 @@ from pprs_dynamics.physics.model.recorded_names import (
     joint_names,
     recorded_columns,
 )
-from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform, require_drives
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
+from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform
 
 OWN = DriveFriction, DriveOffset, ModelJointFriction  # effects that the one pass evaluates
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
@@ -143,7 +145,6 @@ class DriveModel:
             For a key that is unknown, missing, of the wrong type or impossible.
         """
         with source_of_errors(source):
-            require_drives(parameters)
             values = checked_values(parameters)
             robot: Any
             robot, own, reversal, limits = (

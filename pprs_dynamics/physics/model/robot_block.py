@@ -17,7 +17,10 @@ from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.mechanism.description import (
     REVOLUTE,
     Description,
@@ -35,7 +38,6 @@ from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs import robot as three_pprs
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.system.package_files import located
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
@@ -88,12 +90,6 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
 OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
 FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
 TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
-
-
-def require_drives(parameters: Mapping[str, Any]) -> None:
-    """Raise ModelError for an empty list of drives, before keys of their number are checked."""
-    if DRIVES_KEY in parameters and not parameters[DRIVES_KEY]:
-        raise ModelError(DRIVES_KEY, parameters[DRIVES_KEY], 'name at least one joint')
 
 
 def read_mechanism(values: dict[str, Any], folder: Path,
@@ -254,12 +250,6 @@ def described_gravity(structure: Structure) -> tuple[float, ...]:
     return tuple(float(each) for each in turned)
 
 
-def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
-    """Return the radii at which loads of joints rub, where the file has them [m]."""
-    return {name: block['radius'] for name, block in _blocks_below(values, JOINTS).items()
-            if block['radius']}
-
-
 def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
     """Return the turns of motors per turn of each drive, of those that the file names.
 
@@ -322,7 +312,9 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
-                      gravity_in_efforts(values, 'robot.gravity'), joint_radii(values),
+                      gravity_in_efforts(values, 'robot.gravity'),
+                      {name: block['radius'] for name, block in
+                       _blocks_below(values, JOINTS).items() if block['radius']},
                       motor_map(structure, values))
     _require_driven_bodies(robot)
     return robot

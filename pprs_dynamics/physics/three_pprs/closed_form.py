@@ -47,10 +47,8 @@ from pprs_dynamics.physics.mechanism.vectors import (
 )
 
 CHAINS = 3
-# Tables of results, (N, 6) each: TOTAL, RIGID, DRIVE_FRICTION and JOINT_EFFORT, of which alone
-# there are tables for long batches; the drives' motion and guide loads; of the chains cosine and
-# sine of u, its rates, k_r and k_s; and the six rows of [J].
-FORCES = 4
+# Tables of results, (N, 6) each: TOTAL, RIGID, DRIVE_FRICTION and JOINT_EFFORT; the drives' motion
+# and guide loads; of the chains cosine and sine of u, its rates, k_r and k_s; the six rows of [J].
 POSITION, VELOCITY, ACCELERATION, GUIDE_LOAD = 4, 5, 6, 7
 ANGLE, RATE, RESISTANCE, JACOBIAN, EVERYTHING = 8, 9, 10, 11, 17
 NO_LOAD = np.zeros((1, 9))
@@ -218,7 +216,7 @@ def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
         See `PlatformMotion.rows`.
     load : (N, 9) or (1, 9) array
         Wrench of the platform, and moments in the hinges.
-    parts : (FORCES or EVERYTHING, N, 6) array
+    parts : (EVERYTHING, N, 6) array
 
     Returns
     -------
@@ -253,16 +251,15 @@ def _is_sound(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
                       power(rubbing, slides[i]))                               # Eq. (11)
         _write_forces(p, parts, s, CHAINS + i, f.lift, c.lift_velocity, f.lift_load,
                       c.sin_u * power(rubbing, lifts[i]))                      # Eq. (11)
-        if len(parts) > FORCES:
-            _write(parts, POSITION, s, i, c.slide, c.lift)
-            _write(parts, VELOCITY, s, i, c.slide_velocity, c.lift_velocity)
-            _write(parts, ACCELERATION, s, i, c.slide_acceleration, c.lift_acceleration)
-            _write(parts, GUIDE_LOAD, s, i, f.slide_load, f.lift_load)
-            _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
-            _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
-            _write(parts, RESISTANCE, s, i, k[i][0], k[i][1])
-            _write_twist(parts, s, i, 1.0, slides[i])
-            _write_twist(parts, s, CHAINS + i, c.sin_u, lifts[i])
+        _write(parts, POSITION, s, i, c.slide, c.lift)
+        _write(parts, VELOCITY, s, i, c.slide_velocity, c.lift_velocity)
+        _write(parts, ACCELERATION, s, i, c.slide_acceleration, c.lift_acceleration)
+        _write(parts, GUIDE_LOAD, s, i, f.slide_load, f.lift_load)
+        _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
+        _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
+        _write(parts, RESISTANCE, s, i, k[i][0], k[i][1])
+        _write_twist(parts, s, i, 1.0, slides[i])
+        _write_twist(parts, s, CHAINS + i, c.sin_u, lifts[i])
     return is_within_bounds(p, chains, slides, lifts)
 
 

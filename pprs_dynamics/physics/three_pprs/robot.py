@@ -62,9 +62,6 @@ POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.
 MOST_CONDITIONS = 64
-# Samples up to which everything is stored with the forces: a node checks the drives' motion before
-# it answers; of a recording, writing it would take longer than calculating it where it is needed.
-SHORT = 2048
 
 
 class SingularityBounds(NamedTuple):
@@ -346,13 +343,10 @@ class ThreePprs:
 
         None where a sample may be out of reach or too near a singularity.
         """
-        rows = motion.rows
-        table = np.empty((closed_form.EVERYTHING if len(rows) <= SHORT else closed_form.FORCES,
-                          len(rows), 6))
-        if run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table) >= 0:
+        table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+        if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
             return None
-        return InverseDynamicsResult(
-            None, table, table[closed_form.POSITION:][:3] if len(rows) <= SHORT else None)
+        return InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
@@ -421,8 +415,7 @@ class ThreePprs:
         """
         # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            links = ClosedForm(self, motion, table=(
-                found.efforts if found is not None and found.motion is not None else None))
+            links = ClosedForm(self, motion, table=None if found is None else found.efforts)
             if not links.is_regular:
                 links.require_regular()
         return MechanismState(links.position, links.velocity, links.acceleration, motion.time,
