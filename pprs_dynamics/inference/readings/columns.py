@@ -150,10 +150,10 @@ def _without_unit(title: str) -> tuple[list[str], tuple[str, float] | None]:
     words = _words(title)
     for length in (2, 1):
         for at in range(len(words) - length, -1, -1):
+            some = words[at:at + length]
             # Single letters are units in brackets alone.
-            unit = None if len(words[at]) < 2 and words[at].isalpha() else _unit('/'.join(words[at:at + length])) or (
-                _unit(''.join(words[at:at + length])))
-            if unit:
+            if (len(some[0]) > 1 or not some[0].isalpha()) and (
+                    unit := _unit('/'.join(some)) or _unit(''.join(some))):
                 return words[:at] + words[at + length:], unit
     return words, None
 
@@ -165,7 +165,8 @@ def _unit(name: str) -> tuple[str, float] | None:
 
 def _words(text: str) -> list[str]:
     parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', text.replace('_', ' '))  # not in mA
-    return [each for word in re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower()) for each in _split(word)]
+    found = re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower())
+    return [each for word in found for each in _split(word)]
 
 
 def _split(word: str) -> list[str]:
