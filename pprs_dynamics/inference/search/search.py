@@ -103,7 +103,11 @@ class Search:
             before = self.best.cost
             self._fit(self._additions(with_patterns))
             if not self.best.cost < before - LEAST_IMPROVEMENT:
-                self._fit(self._replacements(self.best))
+                # What one effect stood for may be superfluous beside what replaced another.
+                near = [fitted for fitted in self._fit(self._replacements(self.best))
+                        if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
+                for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
+                    simplified(self.fits, fitted)
             barred = self._inadmissible()
             for fitted in barred:
                 self._fit(self._replacements(fitted))
@@ -121,8 +125,8 @@ class Search:
 
     # Moves
 
-    def _fit(self, sets: Iterable[Candidates]) -> None:
-        """Fit sets, and bring those that may be the best to where they cost least."""
+    def _fit(self, sets: Iterable[Candidates]) -> list[CandidateSet]:
+        """Return new sets, fitted; bring those that may be the best to where they cost least."""
         new = [self.fits.evaluate(candidates) for candidates in sets
                if not self.fits.has(candidates) and self._is_bounded(candidates)]
         new += self._with_constants(new)
@@ -133,14 +137,11 @@ class Search:
         for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
             if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
-        # A scan puts it where each drive pays by itself: with others that is seldom right. What an
-        # effect stood for may be superfluous once another is in its place.
-        margin = self.fits.decisions.rival_margin
-        near = sorted((fitted for fitted in new if fitted.cost < self.best.cost + margin),
-                      key=lambda fitted: fitted.cost)[:REFINED]
+        # A scan puts it where each drive pays by itself: with others that is seldom right.
         for fitted in new:
-            if len(fitted.candidates) == len(fitted.effects) == 1 or fitted in near:
+            if len(fitted.candidates) == len(fitted.effects) == 1:
                 simplified(self.fits, fitted)
+        return new
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
         """Return sets with one effect more, where only constants make them worse than the best.
@@ -198,10 +199,18 @@ class Search:
                 yield exchanged(best, candidate, shaped)
             if len(candidate.components) > 1:
                 yield from self._divided(best, candidate)
-            if len(candidate.hypotheses) > 1:  # two effects may be what it is
-                base = self.fits.at_noise_of(best, best.without(candidate))
-                for part in self.scan.proposals(base, REPLACEMENTS):
-                    yield from self._instead(best, part, REPLACEMENTS)
+            if len(candidate.hypotheses) > 1:
+                yield from self._as_two(best, candidate)
+
+    def _as_two(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
+        """Yield a set with two effects in the place of one that claims two things."""
+        base = self.fits.at_noise_of(best, best.without(candidate))
+        simpler = [exchanged(best, candidate, EffectCandidate.of(
+            self.fits.components.variant(component, names) for component in candidate.components))
+            for names in candidate.effect.variants
+            if len(candidate.effect.hypotheses(names)) < len(candidate.hypotheses)]
+        for part in (*self.scan.proposals(base, REPLACEMENTS), *simpler):
+            yield from self._instead(best, part, REPLACEMENTS)
 
     def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
         """Yield a set with other effects on one drive of an effect, and on all of its drives.
