@@ -16,9 +16,9 @@ from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.measurement.files.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_described
