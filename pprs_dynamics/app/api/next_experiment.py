@@ -30,9 +30,9 @@ from pprs_dynamics.app.report.pictures import plot_over_time
 from pprs_dynamics.inference.experiments.motion_design import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
-from pprs_dynamics.measurement.files.motion_files import write_motion
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.simulation.motion_files import write_motion
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
