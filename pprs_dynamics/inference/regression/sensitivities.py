@@ -21,11 +21,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment, bandwidth
-from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import AddedBody, BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel

@@ -32,7 +32,7 @@ from pprs_dynamics.measurement.files.merged_states import (
 )
 from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, Samples, whole_epoch
 from pprs_dynamics.measurement.files.way_out import MOST, missing_names
-from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
+from pprs_dynamics.system.files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
