@@ -95,7 +95,7 @@ class CsvTable:
         UnreadableFileError
             Where it is no text, or empty.
         """
-        with _text_of(path) as (file, _):
+        with text_of(path) as (file, _):
             lines = list(islice(file, PREAMBLE))
         if not lines:
             raise UnreadableFileError(path, 'the file is empty')
@@ -116,7 +116,7 @@ class CsvTable:
         while remarks < len(lines) - 1 and lines[remarks].startswith(REMARKS):
             remarks += 1
         # A header as numpy.savetxt writes it is a remark.
-        rows = [_cells(path, number, line.lstrip('#% ') if number == remarks else line, separator)
+        rows = [cells_of(path, number, line.lstrip('#% ') if number == remarks else line, separator)
                 if line.strip() and number >= remarks else []
                 for number, line in enumerate(lines, 1)]
 
@@ -162,7 +162,7 @@ class CsvTable:
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
         blocks, unpacked, row = [], 0, self.above + 1
-        with _text_of(self.path) as (file, raw):
+        with text_of(self.path) as (file, raw):
             for _ in range(self.above):
                 file.readline()
             while lines := file.readlines(BLOCK):
@@ -179,11 +179,11 @@ class CsvTable:
     def series(self, most: int) -> Iterator[Series]:
         """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
         found: list[list[float]] = []
-        with _text_of(self.path) as (file, _):
+        with text_of(self.path) as (file, _):
             for _ in range(self.above):
                 file.readline()
             for line in islice(file, most):
-                cells = _cells(self.path, 0, line, self.separator) if line.strip() else []
+                cells = cells_of(self.path, 0, line, self.separator) if line.strip() else []
                 if len(cells) == self.count:
                     found.append([self._any(cell) for cell in cells])
         if not found:
@@ -244,7 +244,7 @@ class CsvTable:
 
     def _row(self, number: int, line: str) -> list[str]:
         """Return the cells of a row, or raise UnreadableFileError if it is none of this table."""
-        cells = _cells(self.path, number, line, self.separator)
+        cells = cells_of(self.path, number, line, self.separator)
         if len(cells) == self.count:
             return cells
         raise UnreadableFileError(
@@ -265,7 +265,7 @@ class CsvTable:
                 f'holds {cell[:40]!r}{comma}') from None
 
 
-def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:
     """Return the cells of a row, which ends where its line does."""
     line = BLANK.join(line.split()) if separator == BLANK else line.rstrip('\n')
     try:
@@ -308,7 +308,7 @@ def _seconds_of(date: str) -> float:
 
 
 @contextmanager
-def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
+def text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
     """Open a file as text, and its bytes, of which `tell` is how far it was read."""
     damages = (EOFError, zlib.error, *([zstd().ZstdError] if path.suffix in ZSTANDARD else []))
     try:
