@@ -15,7 +15,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
-from pprs_dynamics.system.input_files import require_files
+from pprs_dynamics.system.files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:

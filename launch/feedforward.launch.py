@@ -14,7 +14,7 @@ from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
-from pprs_dynamics.system.input_files import require_files
+from pprs_dynamics.system.files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:

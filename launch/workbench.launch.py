@@ -11,7 +11,7 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.substitutions import FindPackagePrefix
 
 from launch import LaunchContext, LaunchDescription
-from pprs_dynamics.system.input_files import require_files
+from pprs_dynamics.system.files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -45,7 +45,7 @@ from pprs_dynamics.simulation.injection import (
     PlainRobot,
 )
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.simulated_robot import SensorSettings
 
 # What of the catalogue can be injected into a 3-PPRS.
 IN_CATALOGUE = tuple(name for name in NAMES if name not in (

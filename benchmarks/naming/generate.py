@@ -37,9 +37,7 @@ from pprs_dynamics.measurement.files.recording import (
 )
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import format_model
-from pprs_dynamics.simulation.export.exported_robot import export_robot
-from pprs_dynamics.simulation.export.expressed import express
-from pprs_dynamics.simulation.export.writers import written
+from pprs_dynamics.simulation.export.exported_robot import export_robot, express, written
 from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
 
 DURATION = 40.0  # [s]

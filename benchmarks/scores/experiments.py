@@ -47,7 +47,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
-from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.simulated_robot import SensorSettings
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'link_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',

@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
-from pprs_dynamics.physics.model.margins import Margins, margins
+from pprs_dynamics.physics.model.drive_model import Margins, margins
 from pprs_dynamics.ros.force_command import (
     HOLD_GRAVITY,
     SILENT,

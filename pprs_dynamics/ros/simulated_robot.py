@@ -34,8 +34,12 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.plant import Plant
-from pprs_dynamics.simulation.sensors import SensorSettings
-from pprs_dynamics.simulation.simulated_robot import BANDWIDTH, DAMPING_RATIO, SimulatedRobot
+from pprs_dynamics.simulation.simulated_robot import (
+    BANDWIDTH,
+    DAMPING_RATIO,
+    SensorSettings,
+    SimulatedRobot,
+)
 
 PARAMETERS = (
     node_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),

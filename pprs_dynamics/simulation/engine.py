@@ -26,12 +26,11 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mjcf import readable_spec
-from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
-from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, EngineState, cross
 from pprs_dynamics.simulation.platform import PlatformMechanism
 
 CARRIER = '_added_to_'  # body of what is added to a joint

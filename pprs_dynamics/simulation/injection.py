@@ -24,7 +24,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSerie
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
-from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, RODS
+from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,
@@ -197,21 +197,17 @@ class Injecting:
     engine : MechanismEngine
     choice : Choice
         The effect.
+    random : numpy.random.Generator
+        Of its sizes.
+    scale : float
+        Multiplies these.
     """
 
     model: DriveModel
     engine: MechanismEngine
     choice: Choice
-
-    @property
-    def random(self) -> np.random.Generator:
-        """Generator of the sizes of the effect."""
-        return self.choice.random
-
-    @property
-    def scale(self) -> float:
-        """Multiplies the sizes of the effect."""
-        return self.choice.scale
+    random: np.random.Generator
+    scale: float
 
     @property
     def given(self) -> list[int]:
@@ -228,10 +224,11 @@ class Injecting:
         """Return a random size, times the scale."""
         return self.scale * float(self.random.uniform(low, high))
 
-    def inject_one(self, effect: Callable[[Any], Injected]) -> dict[str, Any]:
-        """Inject the effect and return what is true about it."""
+    def inject_one(self, choice: Choice, effect: Callable[[Any], Injected]) -> dict[str, Any]:
+        """Inject an effect and return what is true about it."""
+        self.choice, self.random, self.scale = choice, choice.random, choice.scale
         drives, parameters = effect(self)
-        return {'name': self.choice.name, 'drives': drives, 'parameters': parameters}
+        return {'name': choice.name, 'drives': drives, 'parameters': parameters}
 
 
 class Injection(Injecting):
@@ -289,8 +286,7 @@ class Injection(Injecting):
             for choice in sorted((one for one in choices if one.name in effects),
                                  key=lambda one: 0 if effects is FORCES
                                  else list(effects).index(one.name)):
-                self.choice = choice
-                self.truths.append(self.inject_one(effects[choice.name]))
+                self.truths.append(self.inject_one(choice, effects[choice.name]))
             if progress is not None:
                 progress(share / len(STAGES))
 

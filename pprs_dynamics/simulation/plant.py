@@ -25,7 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
-from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.engine import MechanismEngine
@@ -176,9 +176,9 @@ class Plant(Injecting):
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.injected: list[dict[str, Any]] = []
         try:
-            for self.choice in chosen:
+            for choice in chosen:
                 self.injected.append(self.inject_one(
-                    BODIES.get(self.choice.name, Plant._push)))
+                    choice, BODIES.get(choice.name, Plant._push)))
         finally:
             self.engine.data.qpos[:] = kept
 

@@ -14,10 +14,8 @@ from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, SPHERICAL
-from pprs_dynamics.simulation.export.exported_robot import described
-from pprs_dynamics.simulation.export.expressed import BALLS, HINGES, MJCF
-from pprs_dynamics.simulation.export.writers import written
+from pprs_dynamics.physics.three_pprs.robot import REVOLUTE, SPHERICAL
+from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, MJCF, described, written
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import yaml
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.files import require_file
 
 LARGEST = 5_000_000  # bytes: a ledger of a thousand steps
 # The parser in C is ten times faster, and not everywhere.

@@ -3,7 +3,7 @@
 
 """A process that computes one call at a time, reports its progress and can be ended at any time.
 
-It is a fresh Python that gets functions and arguments as pickles on its standard input. Scripts and
+It is a fresh Python that gets functions and arguments as pickles through a pipe. Scripts and
 notebooks therefore need no `if __name__ == '__main__'`, as they would with multiprocessing.
 """
 
@@ -15,8 +15,10 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from queue import Empty, Queue
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from threading import Thread
+from time import monotonic
 from typing import Any
 
 from pprs_dynamics.errors import PprsError
@@ -46,21 +48,20 @@ class WorkerProcess:
 
     def __init__(self, niceness: int) -> None:
         self.share = 0.0
-        self._answers: Queue[tuple[str, Any]] = Queue()
+        self._pipe, theirs = Pipe()
         # In a group of its own: Ctrl-C in a terminal is for the program that ends this process.
         self._process = subprocess.Popen(
-            [sys.executable, '-c', START], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            process_group=0)
-        self._reader = Thread(target=self._read, daemon=True)
-        self._reader.start()
+            [sys.executable, '-c', START, str(theirs.fileno())], stdin=subprocess.DEVNULL,
+            pass_fds=(theirs.fileno(),), process_group=0)
+        theirs.close()
         self._sender: Thread | None = None
-        self._write(niceness, list(sys.path))
+        self._send(niceness, list(sys.path))
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> None:
         """Begin with work(*arguments, progress=…); `answer` returns its result."""
         self.share = 0.0
         # In a thread: a pipe takes less than a recording, and Python starts slowly.
-        self._sender = Thread(target=self._write, args=((work, arguments),), daemon=True)
+        self._sender = Thread(target=self._send, args=((work, arguments),), daemon=True)
         self._sender.start()
 
     def answer(self, timeout: float) -> Any:
@@ -75,10 +76,17 @@ class WorkerProcess:
         Exception
             Whatever the work raised.
         """
-        try:
-            kind, value = self._answers.get(timeout=timeout)
-        except Empty:
-            raise TimeoutError from None
+        until, kind = monotonic() + timeout, SHARE
+        while kind == SHARE:
+            try:
+                if not self._pipe.poll(max(until - monotonic(), 0.0)):
+                    raise TimeoutError
+                kind, value = self._pipe.recv()
+            except (EOFError, ConnectionError):
+                raise EndedError('the process that worked on it ended with status '
+                                 f'{self._process.wait()}') from None
+            if kind == SHARE:
+                self.share = value
         if kind == ERROR:
             raise value
         return value
@@ -87,29 +95,14 @@ class WorkerProcess:
         """End the process, whatever it does."""
         self._process.kill()
         self._process.wait()
-        self._reader.join()  # before the pipe that it reads from is closed
         if self._sender is not None:
             self._sender.join()
-        for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
+        self._pipe.close()
 
-    def _write(self, *values: Any) -> None:
+    def _send(self, *values: Any) -> None:
         with suppress(OSError):  # it has ended, as `answer` reports
             for value in values:
-                pickle.dump(value, self._process.stdin)  # type: ignore[arg-type]
-            self._process.stdin.flush()  # type: ignore[union-attr]
-
-    def _read(self) -> None:
-        with suppress(EOFError, OSError, pickle.UnpicklingError):
-            while True:
-                kind, value = pickle.load(self._process.stdout)  # type: ignore[arg-type]
-                if kind == SHARE:
-                    self.share = value
-                else:
-                    self._answers.put((kind, value))
-        self._answers.put((ERROR, EndedError(
-            f'the process that worked on it ended with status {self._process.wait()}')))
+                self._pipe.send(value)
 
 
 def run_in_process(work: Callable[..., Any], *arguments: Any, niceness: int,
@@ -148,31 +141,22 @@ def run_in_process(work: Callable[..., Any], *arguments: Any, niceness: int,
 
 
 def main() -> None:
-    """Answer calls on the standard input with results on the standard output, until it ends."""
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), 'wb')
+    """Answer calls from the pipe that the first argument is the number of, until it is closed."""
+    pipe: Any = Connection(int(sys.argv[1]))
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever the work prints
-
-    def send(kind: str, value: Any) -> None:
-        content = pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL)
-        try:
-            answers.write(content)
-            answers.flush()
-        except BrokenPipeError:
-            os._exit(1)  # nobody is there any more to read it
-
-    calls = sys.stdin.buffer
     with suppress(OSError):
-        os.nice(pickle.load(calls))
-    sys.path[:] = pickle.load(calls)
-    while True:
-        try:
-            work, arguments = pickle.load(calls)
-        except EOFError:
-            return
-        try:
-            send(RESULT, work(*arguments, progress=lambda share: send(SHARE, share)))
-        except Exception as error:
-            send(ERROR, _carried(error))
+        os.nice(pipe.recv())
+    sys.path[:] = pipe.recv()
+    with suppress(EOFError, ConnectionError):  # nobody is there any more
+        while True:
+            work, arguments = pipe.recv()
+            try:
+                answer = RESULT, work(*arguments, progress=lambda share: pipe.send((SHARE, share)))
+            except ConnectionError:
+                return
+            except Exception as error:
+                answer = ERROR, _carried(error)
+            pipe.send(answer)
 
 
 def _carried(error: Exception) -> Exception:

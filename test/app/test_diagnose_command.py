@@ -24,7 +24,7 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.simulation.injection import Choice, Injection, PlainRobot
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.simulated_robot import SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0
 EFFECT = Choice(HIDDEN, np.random.default_rng(11))

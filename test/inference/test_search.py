@@ -69,6 +69,14 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
+def test_two_effects_on_two_drives_are_not_one_flexible_effect_on_both() -> None:
+    recording = recording_of({'coulomb_friction': {'slide_1': {'force': 0.6}},
+                              'quadratic_friction': {'slide_2': {'coefficient': 20.0}}})
+    found = tabulate(MODEL, [recording], DECISIONS).best.effects
+    assert {effect.name: effect.drives for effect in found} == {
+        'coulomb_friction': (0,), 'quadratic_friction': (1,)}
+
+
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
 
 

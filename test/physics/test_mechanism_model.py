@@ -125,7 +125,7 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
     ('tool: flange', 'tool: flansch', 'flansch.*be a link of the URDF'),
     ('base: stand', 'base: beam', r'that no joint moves, but swing \(revolute\) does'),
     ('urdf: made_up.urdf', 'urdf: none.urdf', 'none.urdf'),
-    ('drives: [turn, swing, reach]', 'drives: []', 'at least one joint'),
+    ('drives: [turn, swing, reach]', 'drives: []', r'drives is \[\], must be a list of names'),
     ('base: stand', 'base: stand\n      gane: [1.0, 2.0, 3.0]', 'did you mean robot.gain'),
 ])
 def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: str,

@@ -137,7 +137,7 @@ def test_numbers_are_those_that_ros_reads(tmp_path: Path, number: str) -> None:
     text = PAPER.read_text().replace('reversal_velocity: 0.001', f'reversal_velocity: {number}')
     file = tmp_path / 'model.yaml'
     file.write_text(text)
-    assert DriveModel.load(file).reversal.velocity == 1e-3
+    assert DriveModel.load(file).reversal.velocity == (1e-3,) * 6
 
 
 def test_a_key_given_nested_and_with_dots_is_refused(tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ def test_the_model_itself_is_never_the_output(tmp_path: Path, link: str) -> None
 
 def write_in_process(file: Path, before: str, setup: Any = None) -> int:
     """Write a file in a process of its own in which something goes wrong."""
-    code = (f'{before}\nfrom pprs_dynamics.system.output_files import write_text\n'
+    code = (f'{before}\nfrom pprs_dynamics.system.files import write_text\n'
             f'write_text({str(file)!r}, "new " * 100_000)')
     return subprocess.run([sys.executable, '-c', code], capture_output=True,
                           preexec_fn=setup).returncode

@@ -20,10 +20,15 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
-from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
+from pprs_dynamics.simulation.export.exported_robot import (
+    MJCF,
+    URDF,
+    TreePositions,
+    export_robot,
+    express,
+    written,
+)
 from pprs_dynamics.simulation.export.replay import DURATION, replay
-from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.simulation.injection import draw_motion
 
 EXACT = 1e-9  # of the largest effort

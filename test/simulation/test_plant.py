@@ -18,8 +18,7 @@ from pprs_dynamics.simulation.injected_forms import InjectedEffectError
 from pprs_dynamics.simulation.injection import draw_motion
 from pprs_dynamics.simulation.plant import Plant
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.sensors import SensorSettings
-from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
+from pprs_dynamics.simulation.simulated_robot import SensorSettings, SimulatedRobot
 
 QUIET = SensorSettings(effort_noise=0.0)
 TICK = 0.002

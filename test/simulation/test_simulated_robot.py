@@ -19,8 +19,7 @@ from pprs_dynamics.simulation.drive_control import (
     Setpoint,
 )
 from pprs_dynamics.simulation.plant import Plant
-from pprs_dynamics.simulation.sensors import Measurement, SensorSettings
-from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
+from pprs_dynamics.simulation.simulated_robot import Measurement, SensorSettings, SimulatedRobot
 
 AXIS = DriveModel.load('config/single_axis.yaml')
 QUIET = SensorSettings(quantisation=0.0, effort_noise=0.0)

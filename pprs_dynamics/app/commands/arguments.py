@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.system.files import writable_file
 from pprs_dynamics.system.numbers import parse_number, parse_whole
-from pprs_dynamics.system.output_files import writable_file
 from pprs_dynamics.system.plain_text import displayed
 
 JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)

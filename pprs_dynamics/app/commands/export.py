@@ -15,11 +15,9 @@ from pprs_dynamics.app.commands.arguments import output_file
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.export.exported_robot import export_robot
-from pprs_dynamics.simulation.export.expressed import FORMATS, express
+from pprs_dynamics.simulation.export.exported_robot import FORMATS, export_robot, express, written
 from pprs_dynamics.simulation.export.replay import Replayed, replay
-from pprs_dynamics.simulation.export.writers import written
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 
 ENDINGS = ('.urdf', '.xml', '.mjcf')
 FEW = 8  # names that the terminal lists

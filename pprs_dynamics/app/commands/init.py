@@ -18,7 +18,7 @@ from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.tables import recording_rows
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 EXAMPLE = 'pprs init ur10e.urdf run.csv --output robot.yaml'

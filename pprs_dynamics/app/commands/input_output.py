@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.report.terminal import shown, staged_bar
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import for_json
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import Any
 
 from pprs_dynamics.app.fleet.recordings import pandas
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.output_files import new_file
+from pprs_dynamics.system.files import new_file
 
 AUTO = 'auto'  # effects of a survey that diagnoses
 MODEL = 'model'  # stands for the effect in rows of the model's own numbers

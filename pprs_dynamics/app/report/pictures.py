@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.reproduction import Reproduction
-from pprs_dynamics.system.output_files import new_file
+from pprs_dynamics.system.files import new_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -22,7 +22,7 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.bounded_yaml import read_text
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 ENDING = '.json'

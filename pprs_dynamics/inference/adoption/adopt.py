@@ -39,15 +39,14 @@ from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_g
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
-from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.effects_block import UNCERTAINTIES
 from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
+from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.

@@ -23,11 +23,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.physics.effects.laws.joint_friction import IndependentChainsFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
 from pprs_dynamics.system.plain_yaml import scalar
@@ -166,11 +168,11 @@ class Search:
         """Return the evidence of a reading; the plain motion may be followed in pieces."""
         is_plain = not reading.kind and unit == 1
         key = unit, np.concatenate([reading.scale, reading.offset, reading.positions, (
-            [] if reading.gravity is None else reading.gravity)]).tobytes()
+            [] if reading.gravity is None else reading.gravity), [reading.load]]).tobytes()
         if key not in self._evidence:
             excerpt = self.excerpts.get(unit)
             self._evidence[key] = None if excerpt is None else Evidence.of(
-                mounted(self.model, reading.gravity), excerpt, reading, in_pieces=is_plain)
+                in_reading(self.model, reading), excerpt, reading, in_pieces=is_plain)
         return self._evidence[key]
 
     def _strokes(self) -> tuple[Array, Array]:
@@ -199,6 +201,11 @@ class Search:
             start.prior < table.PLAUSIBLE)
         if explains and start.most_left < table.CLOSE_FIT:
             return None
+        if not (explains and start.most_left < table.EXPLAINED):
+            # A load explains efforts that are many times those of the masses.
+            self.fits += [fit for reading in self._loaded(first)
+                          if (fit := self.fit(reading, 1.0)) is not None
+                          and fit.most_left < table.GOOD_FIT]
         for reading in readings(drives, self.model.units, self.are_counts):
             is_order = reading.kind == 'drive_order'
             if not is_order and explains and start.most_left < table.EXPLAINED:
@@ -220,6 +227,16 @@ class Search:
         best = self._top()
         is_sure = not best.is_plain and best.left <= table.GOOD_FIT and self._is_certain(best)
         return best if is_sure else None
+
+    def _loaded(self, first: Reading) -> list[Reading]:
+        """Return plain readings with loads at the tool, where a robot has one."""
+        model = self.model
+        if PayloadMass.name in model.values.get('effects.active', ()) or (
+                model.kind not in PayloadMass.acts_in):
+            return []
+        mass, most = model.robot.moved_mass, model.bound(PayloadMass).linear[0].upper
+        return [replace(first, load=share * mass, cost=table.COST['load'])
+                for share in table.LOADS if share * mass < most]
 
     def _top(self) -> Fit:
         """Return the best reading; of those that fit alike the first, which is the simplest."""
@@ -252,11 +269,16 @@ class Search:
         """Yield readings with zeros that are quarter turns off, one drive after another."""
         if seed.left < table.CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
             return
-        for _ in self.model.drives:
-            fits = [fit for d, units in enumerate(self.model.units) if units.turns
-                    for turn in table.QUARTERS
-                    if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
-                                        seed.time_unit, seed.score)) is not None]
+        drives = self.model.drives
+        turning = [d for d, units in enumerate(self.model.units) if units.turns]
+        for _ in drives:
+            turned = [quarter_turn(drives, d, turn, seed.reading)
+                      for d in turning for turn in table.QUARTERS]
+            if len(turning) <= table.MOST_TURNED:  # two may be off together
+                turned += [quarter_turn(drives, d, turn, one) for one in turned for d in turning
+                           for turn in table.QUARTERS if d > max(one.drives, default=len(drives))]
+            fits = [fit for reading in turned
+                    if (fit := self.fit(reading, seed.time_unit, seed.score)) is not None]
             best = max(fits, key=lambda fit: fit.score, default=seed)
             if best.score <= seed.score:
                 return
@@ -352,15 +374,18 @@ class Search:
         if not measured or np.ptp(signs) > 0:
             return
         price = table.COST['effort_sign'] if signs[0] < 0 else 0.0
+        sizes, same = np.abs(factors[measured]), np.log(table.SAME_MASSES)
         limits = self.model.limits.efforts
         if len(measured) > 1 and np.all(np.isfinite(limits[measured])):
             for share, name in table.SHARES.items():
-                yield signs[0] / (share * limits), price + table.COST['effort_unit'] + 1.0, name
-        sizes = np.abs(factors[measured])
+                scales = 1 / (share * limits)
+                # Factors near 1 are errors of masses.
+                if np.any(np.abs(np.log(scales[measured])) > same) and np.all(
+                        np.abs(np.log(sizes / scales[measured])) < same):
+                    yield signs[0] * scales, price + table.COST['effort_unit'] + 1.0, name
         # A load may multiply what one drive of several needs.
         if len(measured) >= min(2, len(factors)) and np.all(
-                np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
-                sizes > table.LARGEST_COMPLIANCE):
+                np.abs(np.log(sizes)) > same) and np.all(sizes > table.LARGEST_COMPLIANCE):
             yield (np.where(np.isin(np.arange(len(factors)), measured), factors, 1.0),
                    price + table.COST['drive_constant'], '')
 
@@ -406,6 +431,11 @@ class Search:
         with np.errstate(invalid='ignore'):
             slack = table.STROKE_SLACK * (upper - lower)
         position = read_motion(excerpt.motion, reading).position
+        # Drives may report angles from 0 to a turn.
+        turns = np.array([units.turns for units in self.model.units]) & np.isfinite(upper - lower)
+        middle = np.mean(np.where(turns, (lower, upper), 0.0), axis=0)
+        position = np.where(turns, position - 2 * np.pi * np.round(
+            (position - middle) / (2 * np.pi)), position)
         slack = np.where(np.isfinite(slack), slack, 0.0)
         return not np.any((position < lower - slack) | (position > upper + slack))
 
@@ -510,13 +540,17 @@ def mounted_gravity(model: DriveModel, direction: Array) -> Array:
     return np.linalg.norm(given) * direction + 0.0
 
 
-def mounted(model: DriveModel, direction: Array | None) -> DriveModel:
-    """Return a model under gravity in another direction of the base; the model for None."""
-    if direction is None:
-        return model
-    key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
-    return DriveModel.from_parameters(
-        {**model.values, key: tuple(mounted_gravity(model, direction).tolist())}, model.source)
+def in_reading(model: DriveModel, reading: Reading) -> DriveModel:
+    """Return a model under the gravity, and with the load, of a reading."""
+    changes: dict[str, Any] = {}
+    if reading.gravity is not None:
+        key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
+        changes[key] = tuple(mounted_gravity(model, reading.gravity).tolist())
+    if reading.load:
+        changes = {'effects.active': [*model.values.get('effects.active', ()), PayloadMass.name],
+                   f'effects.{PayloadMass.name}.mass': reading.load}
+    return DriveModel.from_parameters({**model.values, **changes}, model.source) if (
+        changes) else model
 
 
 def _position_scales(model: DriveModel, reading: Reading) -> Scales:
@@ -573,8 +607,10 @@ def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, A
         farthest = max(far, key=lambda k: reach[k] / ends[k])
         scale = plain(len(drives)).changed('position_unit', '', group, 0.0, scale=np.array(
             [unit if k in group else 1.0 for k in range(len(drives))]))
+        # Efforts that could not confirm it leave it a question.
         yield OtherReading.of(
-            'position_unit', drives, group, f'the positions of {named(drives, group)} reach '
+            'stroke' if turns and np.isfinite(recording.effort).any() else 'position_unit',
+            drives, group, f'the positions of {named(drives, group)} reach '
             f'{reach[farthest]:.4g} {model.units[farthest].position}, far out of the stroke'
             + (f', as if they were in {names[unit]}' if unit != 1.0 else ''),
             scales=() if unit == 1.0 else _position_scales(model, scale))

@@ -57,7 +57,6 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
@@ -66,11 +65,11 @@ from pprs_dynamics.physics.effects.drive_effect import (
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.effects_block import effect_uncertainties
 from pprs_dynamics.physics.model.forces import Forces
+from pprs_dynamics.physics.model.parameter_values import effect_uncertainties
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is

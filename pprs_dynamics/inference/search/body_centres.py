@@ -18,8 +18,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import Term
-from pprs_dynamics.physics.effects.added_body import AXES, MOMENTS, PRODUCTS, AddedBody
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.structure_effect import AXES, MOMENTS, PRODUCTS, AddedBody
 
 if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.mechanism import Mechanism

@@ -32,7 +32,6 @@ from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Reg
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import REACH, reach_of
 from pprs_dynamics.inference.search.candidates import Component
-from pprs_dynamics.physics.effects.added_body import KEPT, MOMENTS, AddedBody
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
     FORCES,
     VISCOUS,
@@ -41,7 +40,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
-from pprs_dynamics.physics.effects.structure_effect import with_bodies
+from pprs_dynamics.physics.effects.structure_effect import KEPT, MOMENTS, AddedBody, with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.forces import RIGID_BODY

@@ -26,9 +26,9 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.physics.effects.added_body import AXES, AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.structure_effect import AXES, AddedBody
 
 TOLD = 0.5  # of a coefficient's prior variance, below which the recordings tell it
 # Of the usual precision, for the centre of a body about which the set says nothing.

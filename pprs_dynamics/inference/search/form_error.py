@@ -137,7 +137,10 @@ class FormErrors:
         blocks = fitted.blocks_of(candidate)
         if any(block.mean is not None for block in blocks):
             return sum(self._squares(fitted, candidate).values())
-        index = fitted.fit.index_of(blocks)
+        # What its own form leaves open goes with it: alone it would imitate the candidate.
+        index = fitted.fit.index_of([*blocks, *(
+            block for component in candidate.components
+            for block in fitted.nuisance.get(component, {}).values())])
         std = np.sqrt(np.maximum(fitted.fit.covariance[index, index], 0))
         # Constraints hold some coefficients, of which the variance is 0; units must not count.
         index, std = index[std > 0], std[std > 0]

@@ -39,7 +39,7 @@ class Scan:
         self.fits = fits
 
     def proposals(self, base: CandidateSet, count: int | None = None, least: float = PROPOSED,
-                  ) -> list[Candidates]:
+                  drive: int | None = None) -> list[Candidates]:
         """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
 
         Parameters
@@ -49,9 +49,11 @@ class Scan:
             At most; by default all.
         least : float
             By which the cost must fall at the set's noise.
+        drive : int, optional
+            The only one on which something is added; by default any, and the structure.
         """
         scored: list[tuple[float, Candidates]] = []
-        for effect, found in self.offers(base).items():
+        for effect, found in self.offers(base, drive).items():
             old = next((c for c in base.effects if c.effect is effect), None)
             # A body on another link is another explanation where all are asked for.
             for offered in [found] if count is not None else _by_place(effect, found):
@@ -63,7 +65,8 @@ class Scan:
         scored.sort(key=lambda scored: -scored[0])
         return [candidates for _, candidates in scored[:count]]
 
-    def offers(self, base: CandidateSet) -> dict[type[CatalogueEffect], list[Scored]]:
+    def offers(self, base: CandidateSet, drive: int | None = None,
+               ) -> dict[type[CatalogueEffect], list[Scored]]:
         """Return gains less prior costs of components, by effect; one for each drive or place."""
         components, fit = self.fits.components, base.fit
         taken = {(component.effect, component.drive) for component in base.blocks}
@@ -73,9 +76,10 @@ class Scan:
             self.fits.stepped()
             return found
 
-        offered = each(of_drive, tuple(components.local))
+        offered = each(of_drive, tuple(components.local) if drive is None else (drive,))
         offers = [offer for found_there in offered for offer in found_there]
-        offers += components.shared_offers(fit)
+        if drive is None:
+            offers += components.shared_offers(fit)
         best: dict[Hashable, Scored] = {}
         for component, gain in offers:
             place = (component.effect, component.drive)

@@ -103,7 +103,11 @@ class Search:
             before = self.best.cost
             self._fit(self._additions(with_patterns))
             if not self.best.cost < before - LEAST_IMPROVEMENT:
-                self._fit(self._replacements(self.best))
+                # What one effect stood for may be superfluous beside what replaced another.
+                near = [fitted for fitted in self._fit(self._replacements(self.best))
+                        if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
+                for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
+                    simplified(self.fits, fitted)
             barred = self._inadmissible()
             for fitted in barred:
                 self._fit(self._replacements(fitted))
@@ -121,8 +125,8 @@ class Search:
 
     # Moves
 
-    def _fit(self, sets: Iterable[Candidates]) -> None:
-        """Fit sets, and bring those that may be the best to where they cost least."""
+    def _fit(self, sets: Iterable[Candidates]) -> list[CandidateSet]:
+        """Return new sets, fitted; bring those that may be the best to where they cost least."""
         new = [self.fits.evaluate(candidates) for candidates in sets
                if not self.fits.has(candidates) and self._is_bounded(candidates)]
         new += self._with_constants(new)
@@ -137,6 +141,7 @@ class Search:
         for fitted in new:
             if len(fitted.candidates) == len(fitted.effects) == 1:
                 simplified(self.fits, fitted)
+        return new
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
         """Return sets with one effect more, where only constants make them worse than the best.
@@ -192,12 +197,43 @@ class Search:
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
+            if len(candidate.components) > 1:
+                yield from self._divided(best, candidate)
+            if len(candidate.hypotheses) > 1:
+                yield from self._as_two(best, candidate)
+
+    def _as_two(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
+        """Yield a set with two effects in the place of one that claims two things."""
+        base = self.fits.at_noise_of(best, best.without(candidate))
+        simpler = [exchanged(best, candidate, EffectCandidate.of(
+            self.fits.components.variant(component, names) for component in candidate.components))
+            for names in candidate.effect.variants
+            if len(candidate.effect.hypotheses(names)) < len(candidate.hypotheses)]
+        for part in (*self.scan.proposals(base, REPLACEMENTS), *simpler):
+            yield from self._instead(best, part, REPLACEMENTS)
+
+    def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
+        """Yield a set with other effects on one drive of an effect, and on all of its drives.
+
+        One flexible effect on two drives costs less than two effects until both are replaced.
+        """
+        divided = best.without(candidate)
+        for component in candidate.components:
+            rest = exchanged(best, candidate, with_instead(candidate, component))
+            found = self._instead(best, rest, REPLACEMENTS, component.drive)
+            yield from found
+            known = {component for c in rest for component in c.components}
+            new = [other for c in found[0] for other in c.components if other not in known
+                   ] if found else [component]
+            divided = joined(divided, new)
+        yield divided
 
     def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
-                 ) -> list[Candidates]:
+                 drive: int | None = None) -> list[Candidates]:
         """Return a part of a set with an effect that makes good most of what it lacks."""
         base = self.fits.at_noise_of(best, rest)
-        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED)
+        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
+                                   drive)
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate in the shapes that its own is easily taken for."""
@@ -224,6 +260,16 @@ def with_instead(candidate: EffectCandidate, gone: Component, *instead: Componen
     return EffectCandidate.of([*(component for component in candidate.components
                                  if component is not gone),
                                *instead])
+
+
+def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:
+    """Return candidates with more components, each in the candidate of its effect if there is."""
+    for component in components:
+        old = next((c for c in candidates if isinstance(c, EffectCandidate)
+                    and c.effect is component.effect and c.course == component.course), None)
+        candidates = (*(c for c in candidates if c is not old),
+                      EffectCandidate.of([*(old.components if old else ()), component]))
+    return candidates
 
 
 def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidates:

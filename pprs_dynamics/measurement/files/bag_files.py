@@ -39,7 +39,7 @@ from pprs_dynamics.measurement.files.samples import (
     whole_epoch,
 )
 from pprs_dynamics.measurement.files.way_out import MOST, missing_names
-from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
+from pprs_dynamics.system.files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.csv_files import ZSTANDARD, zstd
 from pprs_dynamics.measurement.files.joint_state_cdr import message_types
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.files import require_file
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection

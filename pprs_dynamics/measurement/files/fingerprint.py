@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.files import require_file
 
 
 def fingerprint(path: str | PathLike[str]) -> str:

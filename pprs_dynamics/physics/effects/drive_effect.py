@@ -18,6 +18,24 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, SLIDE, MechanismState
 
+EXPONENTS = 1 / 3  # standard deviation of real exponents from 1
+LEAST_SHARE = 1e-3  # of the usual size, below which the logarithm goes no further
+
+
+def other_exponent(quantity: Array, column: Array) -> Array:
+    """Return what an exponent by `EXPONENTS` above 1 adds to a column, to first order.
+
+    Parameters
+    ----------
+    quantity : (N,) array
+        Load or speed, of any sign, to which the column is in proportion.
+    column : (N,) array
+    """
+    size = np.abs(quantity)
+    usual = np.sqrt(np.mean(size ** 2)) or 1.0
+    return EXPONENTS * np.log(np.maximum(size / usual, LEAST_SHARE)) * column
+
+
 ALONE = 'drive'  # name of one whose name does not matter
 
 

@@ -7,11 +7,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
-from typing import Any, Self
+from dataclasses import replace
+from functools import cache
+from math import inf
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.mechanism.state import MechanismState, StructureLoad
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, StructureLoad
 
 
 class StructureEffect(CatalogueEffect):
@@ -81,3 +87,216 @@ class PassiveJointEffect(StructureEffect):
     @abstractmethod
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N, N m], (N, D)."""
+
+
+AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
+KEPT = 0.05  # of a body that cannot be taken off it
+LARGEST = 1e3  # [kg]
+
+
+def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
+                    ) -> tuple[Parameter, ...]:
+    """Return the parameters of a body on a link of some mass; `prefix` is before their names."""
+    return (
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
+                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST,
+                  0.0 if prefix else None, scale=0.1),
+        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
+                    -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
+        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
+                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
+          for axes in (*MOMENTS, *PRODUCTS)))
+
+
+def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, ...]:
+    """Return what efforts are linear in: the first moment instead of the centre.
+
+    `moved` is the mass of all that the mechanism moves, as which a body is usually no heavier:
+    on a link that turns about a fixed axis a recording decides the first moment, not the mass.
+    """
+    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
+    moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+                         f'mass times its place along {axis} of {link}',
+                         -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
+    return (replace(mass, expected=(moved, moved) if 0 < moved < inf else None), *moments,
+            *rest[3:])
+
+
+class AddedBody(BodyEffect):
+    """Bodies more on links.
+
+    Class attributes
+    ----------------
+    places : tuple of BodyPlace
+    has_extent : bool
+        Whether centres and inertias are parameters, too.
+    """
+
+    places: ClassVar[tuple[BodyPlace, ...]] = ()
+    has_extent = True
+    idealised = False
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        super().__init__(values)
+        self._linear = self.to_coefficients(self.values)
+
+    @classmethod
+    @cache
+    def on(cls, places: tuple[BodyPlace, ...],
+           alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
+        """Return the effect with these places on a mechanism that moves so much mass.
+
+        Of links that are alike the first represents all, with a body anywhere; with a mass more
+        at its own centre each of them is a hypothesis of its own.
+        """
+        stand_ins = {name for group in alike for name in group[1:]}
+        linear: list[Parameter] = []
+        coefficients: list[Parameter] = []
+        names: list[tuple[str, ...]] = []
+        for place in places:
+            link, centre, weight, is_spread = place
+            prefix, count = cls.prefix_of(place), 1 if is_spread else None
+            linear += body_parameters(prefix, link, centre, weight)[:count]
+            coefficients += body_coefficients(prefix, link, moved)[:count]
+            mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
+            names += ([(mass,)] if link in stand_ins or is_spread else
+                      [(mass,), (mass, *moment)])
+            if not prefix and not is_spread:
+                inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
+                names += [(mass, *moment, *inertia),
+                          (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
+        return type(cls.__name__, (cls,), {
+            'places': places, 'linear': tuple(linear), 'coefficients': tuple(coefficients),
+            'has_extent': not all(place.is_spread for place in places),
+            'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
+            'made_by': (cls.on, (places, alike, moved))})
+
+    @classmethod
+    def at(cls, coefficients: Mapping[str, float]) -> Self:
+        """Return the effect with these coefficients; those not given are zero."""
+        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
+        effect = cls(cls.from_coefficients(every))
+        effect._linear = every  # a moment without a mass has no centre
+        return effect
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the coefficients that belong to parameters."""
+        if not cls.places:
+            return super().to_coefficients(values)
+        found = cls._shared(values)
+        for prefix, centre in cls._bodies():
+            for axis, at in zip(AXES, centre, strict=True):
+                away = values.get(f'{prefix}{axis}', at) - at
+                found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
+        return found
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return the linear parameters that belong to coefficients."""
+        if not cls.places:
+            return super().from_coefficients(coefficients)
+        found = cls._shared(coefficients)
+        for prefix, centre in cls._bodies():
+            mass = found[f'{prefix}mass']
+            for axis, at in zip(AXES, centre, strict=True):
+                moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
+                found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
+        return found
+
+    @classmethod
+    def moments_about_links(cls) -> dict[str, dict[str, float]]:
+        """Return what a body adds to the first moments of its link about the link's frame.
+
+        By name of a coefficient: weights of coefficients.
+        """
+        return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
+                for prefix, centre in cls._bodies()
+                for axis, at in zip(AXES, centre, strict=True)}
+
+    @classmethod
+    def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return masses and inertias, which are parameters and coefficients alike."""
+        return {name: values.get(name, 0.0) for place in cls.places
+                for name in (f'{cls.prefix_of(place)}{last}' for last in (
+                    ('mass',) if place.is_spread else ('mass', *MOMENTS, *PRODUCTS)))}
+
+    @classmethod
+    def prefix_of(cls, place: BodyPlace) -> str:
+        """Return what the names of the parameters at a place begin with."""
+        return f'{place.link}.' if cls.is_of_one_place else ''
+
+    @classmethod
+    def _bodies(cls) -> list[tuple[str, tuple[float, float, float]]]:
+        """Return prefix and centre of the places at which a body has a centre and an inertia."""
+        return [(cls.prefix_of(place), place.centre) for place in cls.places if not place.is_spread]
+
+    @classmethod
+    def around(cls, rows: Mapping[int, Array], coefficients: Mapping[str, float],
+               ) -> dict[int, Array]:
+        """Return columns by drive, exact for the bodies of some coefficients."""
+        found = dict(rows)
+        for prefix, _ in cls._bodies():
+            if mass := coefficients.get(f'{prefix}mass', 0.0):
+                away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
+                                 for axis in AXES])
+                found = {d: cls.rows_about(prefix, one, away) for d, one in found.items()}
+        return found
+
+    @classmethod
+    def rows_about(cls, prefix: str, rows: Array, away: Array) -> Array:
+        """Return the columns of a body's coefficients where its centre is elsewhere.
+
+        Efforts are linear in mass, first moment and inertia, but the inertia of a body grows with
+        the square of its distance: m [I(c)], homogeneous in m and m c. Its derivatives are
+        therefore columns without a constant, exact for a body whose centre is at `away`.
+
+        Parameters
+        ----------
+        prefix : str
+            Of the place.
+        rows : (k, ...) array
+            By coefficient, for a body at the place's centre.
+        away : (3,) array
+            From that centre [m].
+        """
+        known = [c.name for c in cls.coefficients]
+        turning = rows[[known.index(f'{prefix}{axes}') for axes in (*MOMENTS, *PRODUCTS)]]
+        found = rows.copy()
+        half = _turned(away, away)[OF_MOMENTS] / 2
+        found[known.index(f'{prefix}mass')] -= np.tensordot(half, turning, 1)
+        for k, axis in enumerate(AXES):
+            found[known.index(f'{prefix}moment_{axis}')] += np.tensordot(
+                _turned(away, np.eye(3)[k])[OF_MOMENTS], turning, 1)
+        return found
+
+    def changed(self, robot: Any) -> Any:
+        """Return the robot with the bodies."""
+        for place in self.places:
+            prefix, link = self.prefix_of(place), place.link
+            if place.is_spread:
+                robot = robot.heavier(link, self._linear[f'{prefix}mass'])
+                continue
+            c = [self._linear[f'{prefix}{name}'] for name in (
+                'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
+            if not any(c):
+                continue
+            mass, moment = c[0], np.array(c[1:4])
+            xx, yy, zz, xy, xz, yz = c[4:]
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            if mass:
+                body = body_at(mass, tuple(np.array(place.centre) + moment / mass), inertia)
+            else:
+                # What a body of some mass changes by where its centre does.
+                inertia = inertia + _turned(np.array(place.centre), moment)
+                body = np.array([0.0, *moment, *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+            robot = robot.with_body(link, body)
+        return robot
+
+
+def _turned(centre: Array, moment: Array) -> Array:
+    """Return by how much an inertia about a point grows as a first moment is added, (3, 3)."""
+    both = np.outer(centre, moment)
+    grown: Array = 2 * np.trace(both) * np.eye(3) - both - both.T
+    return grown

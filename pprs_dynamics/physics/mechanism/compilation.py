@@ -18,7 +18,7 @@ from typing import Any
 
 import numba
 
-from pprs_dynamics.physics.mechanism.tree_tables import elements
+from pprs_dynamics.physics.mechanism.tree_equations import elements
 
 PACKAGE = 'pprs_dynamics'
 

@@ -15,17 +15,19 @@ from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame
 from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_equations import OPEN_IN_MOTION, WORST_CONDITION, residual
-from pprs_dynamics.physics.mechanism.tree_tables import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     CONDITION,
     DETERMINANT,
     KIND,
     LOOP,
+    OPEN_IN_MOTION,
     TRANSLATION,
+    WORST_CONDITION,
     Data,
     Integers,
     JointFriction,
     Loads,
+    residual,
 )
 
 

@@ -34,9 +34,13 @@ from pprs_dynamics.physics.mechanism.state import (
 )
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
-from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    RIGID,
+    WORST_CONDITION,
+    JointFriction,
+    Loads,
+)
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
-from pprs_dynamics.physics.mechanism.tree_tables import RIGID, JointFriction, Loads
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 LEAST_GRAVITY = 1e-9  # [m/s^2] along a slide, below which its share is rounding
@@ -106,11 +110,6 @@ class Mechanism:
     def gravity_row(self) -> Array:
         """`gravity` as an array."""
         return np.array(self.gravity, dtype=float)
-
-    @property
-    def numbers(self) -> Array:
-        """All numbers besides the structure that determine efforts, in one row."""
-        return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
 
     @cached_property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:

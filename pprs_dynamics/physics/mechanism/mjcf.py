@@ -34,8 +34,8 @@ from pprs_dynamics.physics.mechanism.description import (
     body_at,
     rotation_about,
 )
-from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.urdf import WORLD, read_content, ring
+from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
 # Numbers of parts that a mechanism here has not got, and what they are.
 FOREIGN_PARTS = {'ntendon': 'tendons', 'nflex': 'flexible bodies', 'nplugin': 'plugins'}

@@ -21,9 +21,8 @@ from pprs_dynamics.physics.mechanism.motion_checks import (
     checked_times,
     normalised,
 )
-from pprs_dynamics.physics.mechanism.motion_sample import rotation_matrix
 from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
-from pprs_dynamics.physics.mechanism.vectors import sqrt
+from pprs_dynamics.physics.mechanism.vectors import rotation_matrix, sqrt
 
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')
@@ -32,6 +31,13 @@ ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
 FLOAT = np.dtype(np.float64)
 NO_CHANNELS: Mapping[str, Array] = {}
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
+
+
+def _columns(first: int, end: int, description: str) -> cached_property[Array]:
+    """Return a property of a motion that holds columns of its rows."""
+    columns = cached_property(lambda motion: np.ascontiguousarray(motion.rows[:, first:end]))
+    columns.__doc__ = description
+    return columns
 
 
 class PlatformMotion:
@@ -111,35 +117,12 @@ class PlatformMotion:
             rows, None if self.time is None else self.time[index],
             {name: values[index] for name, values in self.channels.items()})
 
-    @cached_property
-    def position(self) -> Array:
-        """P [m], (N, 3)."""
-        return np.ascontiguousarray(self.rows[:, 0:3])
-
-    @cached_property
-    def orientation(self) -> Array:
-        """Unit quaternions x, y, z, w, (N, 4)."""
-        return np.ascontiguousarray(self.rows[:, 3:7])
-
-    @cached_property
-    def linear_velocity(self) -> Array:
-        """Velocity v of o [m/s], (N, 3)."""
-        return np.ascontiguousarray(self.rows[:, 7:10])
-
-    @cached_property
-    def angular_velocity(self) -> Array:
-        """Angular velocity omega [rad/s], (N, 3)."""
-        return np.ascontiguousarray(self.rows[:, 10:13])
-
-    @cached_property
-    def linear_acceleration(self) -> Array:
-        """Acceleration a_o of o [m/s^2], (N, 3)."""
-        return np.ascontiguousarray(self.rows[:, 13:16])
-
-    @cached_property
-    def angular_acceleration(self) -> Array:
-        """Angular acceleration epsilon [rad/s^2], (N, 3)."""
-        return np.ascontiguousarray(self.rows[:, 16:19])
+    position = _columns(0, 3, 'P [m], (N, 3).')
+    orientation = _columns(3, 7, 'Unit quaternions x, y, z, w, (N, 4).')
+    linear_velocity = _columns(7, 10, 'Velocity v of o [m/s], (N, 3).')
+    angular_velocity = _columns(10, 13, 'Angular velocity omega [rad/s], (N, 3).')
+    linear_acceleration = _columns(13, 16, 'Acceleration a_o of o [m/s^2], (N, 3).')
+    angular_acceleration = _columns(16, 19, 'Angular acceleration epsilon [rad/s^2], (N, 3).')
 
     def is_closed(self) -> bool:
         """Return whether it ends within 1 mm and 1 mrad of where it starts."""

@@ -17,9 +17,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
-from pprs_dynamics.physics.mechanism.tree_tables import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.system.parallel import lazy
 
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
@@ -94,113 +93,27 @@ class StructureLoad(NamedTuple):
 
 
 class Robot(Protocol):
-    """Protocol of a robot with its bodies: `Mechanism`, or the closed form of the 3-PPRS.
-
-    Kinematics, loads and friction tables are the robot's own: they only pass through the state.
-    """
+    """Protocol of what a state asks its robot for; see `Mechanism`."""
 
     @property
-    def structure(self) -> Structure | None:
-        """Joints and links; None for the closed form."""
+    def drives(self) -> tuple[str, ...]: ...
 
     @property
-    def drives(self) -> tuple[str, ...]:
-        """Names of the drives."""
+    def armature(self) -> Array: ...
 
-    @property
-    def kind(self) -> str:
-        """Kind of the robot: effects say on which kinds they act."""
+    def kinematics(self, state: MechanismState) -> Any: ...
 
-    @property
-    def turning(self) -> tuple[str, ...]:
-        """Drives that turn."""
+    def loads(self, links: Any, load: StructureLoad | None) -> Any: ...
 
-    @property
-    def motions(self) -> tuple[type, ...]:
-        """Kinds of motion that have forces."""
+    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None: ...
 
-    @property
-    def armature(self) -> Array:
-        """Inertia of the rotors, seen at the drives [kg m^2, kg], (D,)."""
-
-    @property
-    def gravity(self) -> tuple[float, float, float]:
-        """Gravity in the base [m/s^2]."""
-
-    @property
-    def motors(self) -> Mapping[str, tuple[float, ...]]:
-        """Turns of motors per turn of each drive, of motors that move more than one."""
-
-    @property
-    def passive_joints(self) -> tuple[PassiveJoint, ...]:
-        """Joints without a drive."""
-
-    @property
-    def tool_place(self) -> BodyPlace:
-        """Where a payload is."""
-
-    @property
-    def link_places(self) -> tuple[BodyPlace, ...]:
-        """Links that may be heavier."""
-
-    @property
-    def moved_mass(self) -> float:
-        """Mass of what carries a load, or of all links [kg]."""
-
-    @property
-    def numbers(self) -> Array:
-        """All numbers besides the structure that determine efforts, in one row."""
-
-    @property
-    def position_step(self) -> float:
-        """Step of a drive for derivatives by its position [rad, m]."""
+    def friction_load(self, state: MechanismState) -> Array: ...
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       is_own: bool = False) -> Any:
-        """Return friction of joints as `MechanismState.against_friction` takes it.
+                       is_own: bool = False) -> Any: ...
 
-        `is_own` says that a model file states it for the robot.
-        """
-
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         closed: dict[Any, Array] | None = None) -> Any:
-        """Return the motion, of the first kind in `motions`, that belongs to one of the drives.
-
-        `closed` as of `ModelState`.
-        """
-
-    def at_home(self, samples: int) -> Any:
-        """Return a motion at rest where the robot is put together, one sample a second."""
-
-    def state(self, motion: Any, reversal: Reversal, friction: Any, closed: Any) -> MechanismState:
-        """Return the state for a motion, with the model's own friction of joints."""
-
-    def remember(self, state: MechanismState, closed: dict[Any, Array]) -> None:
-        """Store what makes the next state easier to compute."""
-
-    def kinematics(self, state: MechanismState) -> Any:
-        """Return the kinematics of a state that lacks them."""
-
-    def loads(self, links: Any, load: StructureLoad | None) -> Any:
-        """Return frictionless efforts and reactions."""
-
-    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
-        """Return efforts in one pass, None where kinematics and loads are to be used."""
-
-    def friction_load(self, state: MechanismState) -> Array:
-        """Return the loads of the drives' guides or gears [N m, N], (N, D)."""
-
-    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
-        """Return the state at other positions and accelerations of the drives."""
-
-    def singularity_margin(self, state: MechanismState) -> float | None:
-        """Return how far a motion stays from singular states: 0 at the limit, at most 1."""
-
-    def variables(self, state: MechanismState) -> dict[str, Array]:
-        """Return the variables that an error may depend on, except time and drive motion."""
-
-    def require_bodies(self, key: str, value: Any) -> None:
-        """Raise ModelError, of a key and its value, for bodies that cannot be."""
+    def moved(self, state: MechanismState, position: Array, acceleration: Array,
+              ) -> MechanismState: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +124,7 @@ class MechanismState(JointMotion):
 
     Parameters
     ----------
-    robot : Robot
+    robot : Mechanism or ThreePprs
     reversal : Reversal
     load : StructureLoad, optional
     known : LinkMotion or ClosedForm, optional

@@ -18,7 +18,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.closures import RANK
 from pprs_dynamics.physics.mechanism.description import (
     CONTINUOUS,
     PARAMETERS,
@@ -30,8 +29,8 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
-from pprs_dynamics.physics.mechanism.tree_tables import Integers
+from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure
+from pprs_dynamics.physics.mechanism.tree_equations import Integers
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them

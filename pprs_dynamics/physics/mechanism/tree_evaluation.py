@@ -10,28 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
-    WARM_STEPS,
-    actuator_efforts,
-    close_loops,
-    constraint_forces,
-    forward_kinematics,
-    inverse_dynamics,
-    is_near,
-    is_regular_and_closed,
-    jacobian,
-    joint_friction,
-    predict,
-    residual,
-    update_frame_placements,
-)
-from pprs_dynamics.physics.mechanism.tree_tables import (
     EFFORTS,
     FORCE,
     JOINT_EFFORT,
@@ -39,18 +24,31 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     OF_DRIVE,
     STEPS,
     TRANSMITTED,
+    WARM_STEPS,
     WIDTH,
     Data,
     Integers,
     JointFriction,
     Loads,
     Model,
+    actuator_efforts,
+    close_loops,
+    constraint_forces,
     elements,
+    forward_kinematics,
+    inverse_dynamics,
+    is_near,
+    is_regular_and_closed,
+    jacobian,
+    joint_friction,
     length_of,
     packed_tables,
+    predict,
     read_loads,
     read_motion,
     read_tables,
+    residual,
+    update_frame_placements,
     views,
 )
 
@@ -61,40 +59,36 @@ NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-class InverseDynamicsResult:
-    """Closed coordinates and drive efforts of N samples.
+class InverseDynamicsResult(NamedTuple):
+    """Drive efforts of N samples, and closed coordinates of robots without a closed form.
 
     Parameters
     ----------
-    q : (N, C) array
+    q : (N, C) array or None
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
-        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
-    motion : three (N, D) arrays
-        Position, velocity and acceleration of the drives.
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
+        `closed_form` for the other rows of a 3-PPRS.
+    motion : three (N, D) arrays, or None
+        Position, velocity and acceleration of the drives, where they are known.
     """
 
-    __slots__ = ('efforts', 'motion', 'q')
-
-    def __init__(self, q: Array, efforts: Array, motion: tuple[Array, Array, Array]) -> None:
-        self.q, self.efforts, self.motion = q, efforts, motion
-
-    def drive_motion(self) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration of the drives."""
-        return self.motion
+    q: Any
+    efforts: Array
+    motion: Any
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
               given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              resistance: Any, actuators: Any, closed: Any, efforts: Any, stages: int,
+              actuators: Any, closed: Any, efforts: Any, stages: int,
               nearby: bool) -> int:
     """Evaluate the stages at each sample in turn; see `Evaluation`.
 
     Return the first sample that fails, or -1.
     """
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                      resistance[2], resistance[3]))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
     for s in range(len(closed)):
         at = s if stages & KEPT else 0
         m = elements(read_motion(sizes, motions[at], reals))
@@ -139,11 +133,11 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
 
 
 def _rub(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
-         rubbing: Any, resistance: Any, of_tree: Any, efforts: Any) -> None:
+         rubbing: Any, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                      resistance[2], resistance[3]))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
     for s in range(len(efforts)):
         m = elements(read_motion(sizes, motions[s], reals))
         o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
@@ -165,7 +159,7 @@ class Evaluation:
         self.sizes = self.packed.sizes
         self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
-        self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
+        self._friction = NO_FRICTION, np.array(NO_FRICTION)
         drives = len(t.drives)
         self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
         self._no_actuators = np.zeros((OF_DRIVE, drives))
@@ -241,8 +235,8 @@ class Evaluation:
         """
         found = np.zeros((len(rows), len(self.tables.drives)))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction[:2]),
-            np.array(friction[2:]), np.empty(len(self.home)), found)
+        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction),
+            np.empty(len(self.home)), found)
         return found
 
     def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
@@ -292,14 +286,14 @@ class Evaluation:
             loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
         if friction is not last[0]:
-            last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
+            last = self._friction = friction, np.array(friction)
         warm = nearby is not None
         at_home = self.at_home if warm or not stages & KEPT else NOWHERE
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
         return int(run(
             _evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
-            gravity, loads, last[1], last[2], actuators, closed, efforts, stages, warm))
+            gravity, loads, last[1], actuators, closed, efforts, stages, warm))
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:

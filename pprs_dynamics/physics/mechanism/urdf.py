@@ -40,7 +40,7 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
     rotation_of,
 )
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.files import require_file
 
 WORLD = 'world'
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB

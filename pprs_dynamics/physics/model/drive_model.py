@@ -29,13 +29,28 @@ from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
-from pprs_dynamics.physics.model.effects_block import added_effects
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    ARMATURE,
+    COEFFICIENT,
+    COULOMB,
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OFFSET,
+    RIGID,
+    TOTAL,
+    VISCOUS,
+    WIDTH,
+)
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
@@ -48,18 +63,21 @@ from pprs_dynamics.physics.model.keys import (
     title_of,
 )
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.physics.model.one_pass import OWN, OnePass, one_pass_of
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
-from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
-from pprs_dynamics.physics.model.platform_block import read_platform
+from pprs_dynamics.physics.model.parameter_values import (
+    added_effects,
+    checked_values,
+    source_of_errors,
+)
 from pprs_dynamics.physics.model.recorded_names import (
     CURRENT,
     effort_kind,
     joint_names,
     recorded_columns,
 )
-from pprs_dynamics.physics.model.robot_block import read_mechanism, require_drives
+from pprs_dynamics.physics.model.robot_block import read_mechanism, read_platform
 
+OWN = DriveFriction, DriveOffset, ModelJointFriction  # effects that the one pass evaluates
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
 
@@ -127,7 +145,6 @@ class DriveModel:
             For a key that is unknown, missing, of the wrong type or impossible.
         """
         with source_of_errors(source):
-            require_drives(parameters)
             values = checked_values(parameters)
             robot: Any
             robot, own, reversal, limits = (
@@ -341,9 +358,7 @@ class DriveModel:
         """
         if type(motion) is not self._usual_motion:
             self._require_motion(motion)
-        one_pass = self._one_pass
-        found = None if one_pass is None else one_pass.forces(
-            motion, None if state is None else state.closed)
+        found = self._one_pass(motion, None if state is None else state.closed)
         if found is None:
             # Very large numbers overflow; users of the result check that it is finite.
             with np.errstate(over='ignore', invalid='ignore'):
@@ -364,8 +379,46 @@ class DriveModel:
         return None if self.moves_joints else PlatformMotion
 
     @cached_property
-    def _one_pass(self) -> OnePass | None:
-        return one_pass_of(self.robot, self.effects, self.reversal, self._joint_friction)
+    def _own_parameters(self) -> Any:
+        """Parameters of the pass over bodies and own friction, None where there is none.
+
+        Effects that change the bodies, and the second approach to friction, Eq. (13), have none.
+        """
+        drives = np.zeros((OF_DRIVE, len(self.drives)))
+        drives[ARMATURE], drives[WIDTH] = self.robot.armature, self.reversal.velocity
+        for effect in self.effects:
+            if isinstance(effect, DriveFriction):
+                drives[VISCOUS], drives[COULOMB] = effect.viscous, effect.coulomb
+                drives[COEFFICIENT] = effect.coefficient
+            elif isinstance(effect, DriveOffset):
+                drives[OFFSET] = effect.value
+            elif isinstance(effect, BodyEffect | IndependentChainsFriction):
+                return None
+        return self.robot.friction_parameters(self._joint_friction, drives)
+
+    def _one_pass(self, motion: Any, closed: dict[Any, Array] | None) -> Forces | None:
+        """Return the forces of bodies and own friction, from one pass that stores nothing else.
+
+        None for a motion that has no pass, and where a sample may be out of reach or too near a
+        singularity: the caller must check every sample then.
+        """
+        parameters = self._own_parameters
+        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed)
+        return None if found is None else Forces(
+            found.efforts[TOTAL], lambda: self._own_parts(found.efforts),
+            lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),
+            found.motion)
+
+    def _own_parts(self, efforts: Array) -> dict[str, Array]:
+        """Return the parts of efforts by name, in the order of the effects."""
+        parts = {RIGID_BODY: efforts[RIGID]}
+        for effect in self.effects:
+            if isinstance(effect, DriveOffset):
+                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[TOTAL])
+            elif isinstance(effect, OWN):
+                parts[effect.name] = efforts[
+                    DRIVE_FRICTION if isinstance(effect, DriveFriction) else JOINT_EFFORT]
+        return parts
 
     @cached_property
     def _added(self) -> tuple[Effect, ...]:
@@ -510,3 +563,42 @@ class DriveModel:
         errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
                                 for one in self.misreadings], axis=0)
         return errors
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Smallest distances from the limits over all samples: 0 at the limit, at most 1.
+
+    Parameters
+    ----------
+    singularity : float or None
+        See `Mechanism.singularity_margin`.
+    workspace : float
+        Distance of a drive from an end of its stroke, over half the stroke.
+    drive : str
+        The drive nearest to an end of its stroke.
+    """
+
+    singularity: float | None
+    workspace: float
+    drive: str
+
+
+def margins(model: DriveModel, mechanism: Any) -> Margins:
+    """Return the margins of a motion that the model has accepted.
+
+    Parameters
+    ----------
+    model : DriveModel
+    mechanism : MechanismState
+        What `model.drive_forces` returned with the forces.
+    """
+    lower, upper = model.limits.strokes
+    position = mechanism.position
+    with np.errstate(invalid='ignore'):  # no limit of a joint: infinity over infinity
+        room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (
+            upper - lower) * 2
+    room = np.where(np.isnan(room), 1.0, room)
+    nearest = int(room.argmin())
+    return Margins(model.robot.singularity_margin(mechanism), float(room[nearest]),
+                   model.drives[nearest])

@@ -36,8 +36,8 @@ class Forces:
         `rigid_body`, the model's own friction, and one per added effect; they sum to `total`.
     mechanism : state, or function that returns it
         What the forces were computed from.
-    drive_motion : function, optional
-        Returns position, velocity and acceleration of the drives; without it those of the state.
+    drive_motion : three (N, D) arrays, optional
+        Position, velocity and acceleration of the drives; without it those of the state.
     """
 
     __slots__ = ('_drive_motion', '_mechanism', '_parts', 'total')
@@ -46,7 +46,7 @@ class Forces:
     # than the equations.
     def __init__(self, total: Array, parts: dict[str, Array] | Callable[[], dict[str, Array]],
                  mechanism: Any,
-                 drive_motion: Callable[[], tuple[Array, ...]] | None = None) -> None:
+                 drive_motion: Any = None) -> None:
         self.total, self._parts, self._mechanism = total, parts, mechanism
         self._drive_motion = drive_motion
 
@@ -71,7 +71,7 @@ class Forces:
     def drive_motion(self) -> tuple[Array, ...]:
         """Position, velocity and acceleration of the drives, (N, D) each."""
         if self._drive_motion is not None:
-            return self._drive_motion()
+            return tuple(self._drive_motion)
         state = self.mechanism
         return state.position, state.velocity, state.acceleration
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -25,10 +25,9 @@ from typing import Any
 import yaml
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.effects_block import UNCERTAINTIES
 from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, Key, as_list, keys_of
 from pprs_dynamics.physics.model.ledger import BLOCK
 from pprs_dynamics.physics.model.parameter_file import (
@@ -37,15 +36,19 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
+from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.system.bounded_yaml import check_size, parse
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.package_files import located
 
 WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is people's
 INDENT = '  '
 DEPTH = 2  # of the keys, below /** and ros__parameters
 COMMENT_COLUMN = 46
+# A key and its value, if that is on the same line, with the comment after it.
+ENTRY = re.compile(r'(?P<start> *(?P<name>[^\s#:][^:#]*): *)(?P<value>[^#\n]*?)(?P<space> *)'
+                   r'(?P<comment>#.*)?\n?$')
 NOT_PLAIN = {'y', 'n', 'nan', 'inf'}  # words for YAML 1.1, not for ROS 2
 
 
@@ -150,106 +153,66 @@ def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
               if key in old or key not in keys or as_list(value) != as_list(keys[key].default)}
+    edited = _edited(text, old, wanted)
     try:
-        edited = _edited(text, old, wanted)
         if _same(parse_parameters(edited), wanted):
             return edited
-    except (_NotEditableError, yaml.YAMLError, ModelError):
+    except PprsError:
         pass
-    # A file of a form that cannot be edited in place.
+    # A file of a form that cannot be edited line by line.
     others = other_nodes(text)
     return format_model(values, path) + (yaml.safe_dump(others, sort_keys=False) if others else '')
 
 
-class _NotEditableError(Exception):
-    """Values cannot be replaced one by one in a file of this form."""
-
-
 def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    root: Any = yaml.compose(text, Loader=yaml.SafeLoader)
-    block = _model_block(root)
-    if block.flow_style or not block.value:
-        raise _NotEditableError
-    changes: list[tuple[int, int, str]] = []
-    places = dict(_places(block))
-    lines = text.splitlines(keepends=True)
-    starts = [0]
-    for line in lines:
-        starts.append(starts[-1] + len(line))
-    new = {}
-    for key, value in wanted.items():
-        if key.split('.')[0] in WRITTEN or as_list(old.get(key)) == as_list(value):
-            continue
-        node = places.get(key)
-        if node is None:
-            new[key] = value
-        elif isinstance(node, yaml.CollectionNode) and not node.flow_style:
-            changes.append((node.start_mark.index, starts[_last_line(node) + 1] - 1,
-                            _value(value)))
-        else:
-            changes.append(_replacement(text, node, _value(value)))
-    # The written blocks go, with their lines, and come anew after the last key and at the end.
-    end = max(_last_line(node) for key, node in block.value) + 1
-    for key, node in (*block.value, *root.value):
-        if key.value.split('.')[0] in (*WRITTEN, LEDGER):
-            changes.append((starts[key.start_mark.line], starts[_last_line(node) + 1], ''))
-    indent = block.value[0][0].start_mark.column
-    there = {key.value.split('.')[0] for key, _ in block.value}
+    """Return the text with wanted values, each key on a line of its own.
+
+    The written blocks go, and come anew after the last key of the model and at the end.
+    """
+    model = next(iter(sorted(parse(text), key=lambda node: node != '/**')))
+    new = {key: value for key, value in wanted.items() if key.split('.')[0] not in WRITTEN
+           and as_list(old.get(key)) != as_list(value)}
+    lines: list[str] = []
+    parents: list[tuple[int, str]] = []  # indents and names of the blocks that a line is in
+    end, margin, dropped, there = 0, DEPTH * len(INDENT), -1, set()
+    for line in text.splitlines(keepends=True):
+        indent, content = len(line) - len(line.lstrip(' ')), line.strip()
+        if dropped >= 0 and content:
+            if indent > dropped:
+                continue
+            dropped = -1
+        entry = ENTRY.match(line)
+        if entry is not None:
+            while parents and parents[-1][0] >= indent:
+                parents.pop()
+            parents.append((indent, entry['name'].strip('"\'')))
+            node, _, *names = [name for _, name in parents] + [''] * (len(parents) < 2)
+            key = '.'.join(names)
+            if node == LEDGER or (node == model and key.split('.')[0] in WRITTEN):
+                dropped = indent
+                continue
+            if node == model and key:
+                there.add(key.split('.')[0])
+                margin = indent if len(names) == 1 else margin
+                if key in new and entry['value']:
+                    line = f"{entry['start']}{_value(new.pop(key))}"
+                    if entry['comment']:
+                        line = f"{line.ljust(entry.start('comment') - 2)}  {entry['comment']}"
+                    line += '\n'
+        lines.append(line)
+        if parents and parents[0][1] == model and content and not content.startswith('#'):
+            end = len(lines)
     keys = keys_of(wanted)
     whole = {key: value for key, value in new.items()
              if key in keys and key.split('.')[0] not in there}
-    shift = ' ' * (indent - DEPTH * len(INDENT))
-    blocks = '\n'.join([
-        *(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()
-          if key not in whole),
-        *(shift + line for line in _lines(whole, DEPTH, keys)),
-        *_effects_block(wanted, indent)])
-    if not text.endswith('\n') and end == len(lines):
-        blocks = '\n' + blocks
-    changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
-    for start, stop, change in sorted(changes, key=lambda change: change[:2], reverse=True):
-        text = text[:start] + change + text[stop:]
-    if ledger := _ledger_section(wanted):
-        text += '\n' * (not text.endswith('\n')) + '\n'.join(ledger) + '\n'
-    return text
-
-
-def _replacement(text: str, node: yaml.Node, value: str) -> tuple[int, int, str]:
-    """Return where a value stands and what shall, a comment after it in its column."""
-    start, end = node.start_mark.index, node.end_mark.index
-    space = re.compile(r' {2,}(?=#)').match(text, end)
-    if space is None:
-        return start, end, value
-    width = end - start + len(space.group())
-    return start, start + width, value.ljust(width - 2) + '  '
-
-
-def _model_block(root: Any) -> yaml.MappingNode:
-    """Return the mapping of the model's parameters."""
-    for name in ('/**', None):
-        for key, node in root.value:
-            if name in (None, key.value):
-                for inner, block in node.value:
-                    if inner.value == 'ros__parameters' and isinstance(block, yaml.MappingNode):
-                        return block
-    raise _NotEditableError
-
-
-def _places(block: yaml.MappingNode, prefix: str = '') -> Iterator[tuple[str, yaml.Node]]:
-    for key, node in block.value:
-        if isinstance(node, yaml.MappingNode) and node.value:
-            yield from _places(node, f'{prefix}{key.value}.')
-        else:
-            yield prefix + key.value, node
-
-
-def _last_line(node: yaml.Node) -> int:
-    """Return the last line of a value; of a block, not the comments after it."""
-    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]
-        return _last_line(last[1] if isinstance(last, tuple) else last)
-    mark = node.end_mark
-    return int(mark.line - (mark.column == 0 and mark.line > node.start_mark.line))
+    shift = ' ' * (margin - DEPTH * len(INDENT))
+    added = [*(f'{" " * margin}{key}: {_value(value)}' for key, value in new.items()
+               if key not in whole),
+             *(shift + line for line in _lines(whole, DEPTH, keys)),
+             *_effects_block(wanted, margin)]
+    lines[:end] = [line if line.endswith('\n') else f'{line}\n' for line in lines[:end]]
+    return ''.join((*lines[:end], *(f'{line}\n' for line in added), *lines[end:],
+                    *(f'{line}\n' for line in _ledger_section(wanted))))
 
 
 def _ledger_section(values: Mapping[str, Any]) -> list[str]:

@@ -10,17 +10,150 @@ from contextlib import contextmanager
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.model.effects_block import check_tolerances, check_uncertainties
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     NAMED_BLOCKS,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
+    Key,
     is_described,
     keys_of,
+    title_of,
 )
+from pprs_dynamics.physics.model.ledger import NOT_KNOWN, read_steps
 from pprs_dynamics.physics.model.reference_keys import check_reference
+
+UNCERTAINTIES = 'uncertainties'
+
+
+def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, float]:
+    """Return the standard deviation of each parameter of an effect, by drive.parameter.
+
+    What the file says; of files from before there was a block for it, what the ledger's last step
+    with the parameter says. A parameter of which neither says anything is taken as exact.
+    """
+    prefix = f'{UNCERTAINTIES}.{effect}.'
+    found: dict[str, float] = {}
+    for step in read_steps(values):
+        if step.effect == effect:
+            found.update((key, std) for key, std in zip(step.parameters, step.std, strict=False)
+                         if std < NOT_KNOWN)
+    found.update((key.removeprefix(prefix), float(std)) for key, std in values.items()
+                 if key.startswith(prefix))
+    return found
+
+
+def check_uncertainties(parameters: Mapping[str, Any]) -> None:
+    """Raise ModelError for an uncertainty that is none, or of nothing that an effect has."""
+    active = parameters.get('effects.active') or ()
+    for key, value in parameters.items():
+        if not key.startswith(f'{UNCERTAINTIES}.'):
+            continue
+        _, name, *rest = key.split('.')
+        if find_effect(name) is None or not rest:
+            raise UnknownNameError('key', key, [
+                f'{UNCERTAINTIES}.{one}' for one in active])
+        if name in active and f'effects.{name}.{".".join(rest)}' not in parameters:
+            raise ModelError(key, value, f'belong to effects.{name}.{".".join(rest)}, which is '
+                             'not there: take the line out')
+        Key(key, 'a standard deviation', lower=0).check(value)
+
+
+# Keys of the block `effects` that are no effect.
+LISTS = ('effects.active', 'effects.measured')
+
+
+def added_effects(
+    parameters: Mapping[str, Any], robot: Any,
+) -> Iterator[CatalogueEffect]:
+    """Yield the effects that are active on a robot, all blocks checked."""
+    active = parameters.get('effects.active', [])
+    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
+        raise ModelError('effects.active', active, 'be a list of names of effects')
+    if len(set(active)) < len(active):
+        raise ModelError('effects.active', list(active), 'name each effect once')
+    for name in active:
+        if find_effect(name) is None:
+            raise _unknown(name, 'effects.active')
+    blocks: dict[str, dict[str, Any]] = {}
+    for key, value in parameters.items():
+        block, _, rest = key.partition('.')
+        if block == 'effects' and key not in LISTS:
+            name, _, rest = rest.partition('.')
+            if rest:
+                blocks.setdefault(name, {})[rest] = value
+            elif value in (None, {}):
+                blocks.setdefault(name, {})
+            else:
+                raise ModelError(key, value, 'be a mapping of its parameters')
+    of_sensors = _effects_of_sensors(parameters)
+    for name, values in blocks.items():
+        found = find_effect(name)
+        if found is None:
+            raise _unknown(name, 'effects')
+        _check_place(name, values, found, robot, title_of(parameters))
+        # A block that is not active is checked all the same, but may still be incomplete.
+        effect = found.bound(robot).from_file(values, name in active, robot.turning)
+        if name in active:
+            if name in of_sensors:
+                effect.is_measurement = True
+            yield effect
+    missing = [name for name in active if name not in blocks]
+    if missing:
+        raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
+
+
+def _unknown(name: str, place: str) -> UnknownNameError:
+    return UnknownNameError('effect', name, catalogue(), place)
+
+
+def _check_place(name: str, values: Mapping[str, Any], effect: type[CatalogueEffect], robot: Any,
+                 title: str) -> None:
+    """Raise ModelError where an effect is not one of this kind of robot, or on another drive."""
+    if robot.kind not in effect.acts_in:
+        raise ModelError(f'effects.{name}', dict(values), 'be an effect that acts in ' + title)
+    for key in values if issubclass(effect, DriveEffect) else ():
+        if (drive := key.rpartition('.')[0] or key) not in robot.drives:
+            raise UnknownNameError('drive', drive, robot.drives, f'effects.{name}')
+
+
+def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
+    names = parameters.get('effects.measured', [])
+    if not isinstance(names, (list, tuple)) or not all(
+            isinstance(name, str) and (kind := find_effect(name)) is not None
+            and kind.may_be_measurement for name in names):
+        raise ModelError('effects.measured', names, "be a list of effects that may be a sensor's:"
+                         ' effort_offset')
+    return list(names)
+
+
+def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
+    """Raise ModelError for a tolerance that is none, or of nothing that has one.
+
+    Numbers of the model have one, in proportion to them; and what is usually small where a file
+    says nothing, such as the error of a zero, in its unit.
+    """
+    for name, value in parameters.items():
+        target = name.removeprefix('tolerances.')
+        if target == name:
+            continue
+        if (target not in keys or not keys[target].is_number) and _expected(target) is None:
+            raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
+                                                 if keys[key].is_number])
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
+            raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
+
+
+def _expected(target: str) -> tuple[float, float] | None:
+    """Return how large `effect.parameter` usually is, None for what has no usual size."""
+    name, _, last = target.partition('.')
+    effect = find_effect(name) if last else None
+    return next((p.expected for p in effect.parameters if p.name == last),
+                None) if effect is not None and hasattr(effect, 'parameters') else None
 
 
 @contextmanager

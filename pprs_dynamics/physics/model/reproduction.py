@@ -16,12 +16,14 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES
-from pprs_dynamics.physics.three_pprs.independent_chains import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 # Of the paper's path; fine enough that rms figures no longer change in four digits.

@@ -13,11 +13,14 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    IndependentChainsFriction,
+    ModelJointFriction,
+)
 from pprs_dynamics.physics.mechanism.description import (
     REVOLUTE,
     Description,
@@ -33,7 +36,52 @@ from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, JOINTS, LOCKED, MOTORS, POSE
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
+from pprs_dynamics.physics.three_pprs import robot as three_pprs
+from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.system.package_files import located
+
+STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
+
+
+def read_platform(values: Mapping[str, Any],
+                  ) -> tuple[three_pprs.ThreePprs, tuple[Effect, ...], Reversal, DriveLimits]:
+    """Return a 3-PPRS, its own friction, its smoothing and limits, from checked values."""
+    for stroke in dict.fromkeys(STROKES):
+        if not values[stroke][0] < values[stroke][1]:
+            raise ModelError(stroke, values[stroke], 'be a lower and a higher position [m]')
+    blocks = {joint: {'viscous': values[f'friction.{joint}.viscous'],
+                      'coulomb': values[f'friction.{joint}.coulomb'],
+                      'radius': values[f'friction.{joint}.diameter'] / 2}
+              for joint in (three_pprs.REVOLUTE, three_pprs.SPHERICAL)}
+    is_independent = values['friction.approach'] == 'independent_chains'
+    passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
+               else ModelJointFriction(blocks))
+    robot = three_pprs.ThreePprs(
+        Geometry(**_below(values, 'geometry.')), Masses(**_below(values, 'masses.')),
+        gravity_in_efforts(values, 'gravity'),
+        {name: block['radius'] for name, block in blocks.items()},
+        three_pprs.SingularityBounds(values['limits.rod_sine'], values['limits.condition_number'],
+                                     values['limits.rod_cosine'] if is_independent else 0.0),
+        values['equations'] == 'printed')
+    drives = DriveFriction(values['friction.drives.viscous'], 0.0,
+                           values['friction.drives.coulomb'])
+    return (robot, (drives, passive),
+            Reversal(_reversal_widths(values), values['friction.reversal_rate']),
+            platform_limits(values))
+
+
+def platform_limits(values: Mapping[str, Any]) -> DriveLimits:
+    """Return the strokes and efforts in the values of a 3-PPRS."""
+    lower, upper = np.array([values[key] for key in STROKES]).T
+    return DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
+                       np.array(values['limits.effort']), STROKES, 'limits.effort')
+
+
+def _reversal_widths(values: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return the width in which friction of each drive turns over."""
+    return tuple(own or values['friction.reversal_velocity']
+                 for own in values['friction.reversal_velocities'])
+
 
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
@@ -42,12 +90,6 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
 OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
 FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
 TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
-
-
-def require_drives(parameters: Mapping[str, Any]) -> None:
-    """Raise ModelError for an empty list of drives, before keys of their number are checked."""
-    if DRIVES_KEY in parameters and not parameters[DRIVES_KEY]:
-        raise ModelError(DRIVES_KEY, parameters[DRIVES_KEY], 'name at least one joint')
 
 
 def read_mechanism(values: dict[str, Any], folder: Path,
@@ -59,11 +101,10 @@ def read_mechanism(values: dict[str, Any], folder: Path,
     structure = read_structure(values, folder)
     values.update(described_values(structure, values))
     robot = _with_bodies(structure, values)
-    common = values['friction.reversal_velocity']
-    width = tuple(own or common for own in values['friction.reversal_velocities'])
     return (robot, (DriveFriction(values['friction.viscous'], values['friction.coulomb']),
                     DriveOffset(values['friction.offset']), *passive_friction(structure, values)),
-            Reversal(width, values['friction.reversal_rate'], values['friction.reversal_slide']),
+            Reversal(_reversal_widths(values), values['friction.reversal_rate'],
+                     values['friction.reversal_slide']),
             joint_limits(structure))
 
 
@@ -209,12 +250,6 @@ def described_gravity(structure: Structure) -> tuple[float, ...]:
     return tuple(float(each) for each in turned)
 
 
-def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
-    """Return the radii at which loads of joints rub, where the file has them [m]."""
-    return {name: block['radius'] for name, block in _blocks_below(values, JOINTS).items()
-            if block['radius']}
-
-
 def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
     """Return the turns of motors per turn of each drive, of those that the file names.
 
@@ -277,7 +312,9 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
-                      gravity_in_efforts(values, 'robot.gravity'), joint_radii(values),
+                      gravity_in_efforts(values, 'robot.gravity'),
+                      {name: block['radius'] for name, block in
+                       _blocks_below(values, JOINTS).items() if block['radius']},
                       motor_map(structure, values))
     _require_driven_bodies(robot)
     return robot

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from typing import Any, ClassVar, NamedTuple
@@ -31,35 +31,37 @@ from pprs_dynamics.physics.mechanism.state import (
     PassiveJoint,
     StructureLoad,
 )
-from pprs_dynamics.physics.mechanism.tree_tables import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     COEFFICIENT,
     JOINT_EFFORT,
     RIGID,
     VISCOUS,
     WIDTH,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, DriveParameters
-from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.kernel_parameters import (
-    REVOLUTE,
-    SPHERICAL,
-    ChainMasses,
+from pprs_dynamics.physics.three_pprs.closed_form import (
+    FRICTIONLESS_DRIVES,
+    FRICTIONLESS_JOINTS,
+    Chain,
+    DriveParameters,
     Joints,
-    PlatformBody,
-    RobotParameters,
+    Parameters,
 )
-from pprs_dynamics.physics.three_pprs.tree import HOME_HEIGHT, structure_of, tree_structure
+from pprs_dynamics.physics.three_pprs.geometry import (
+    HOME_HEIGHT,
+    Geometry,
+    Masses,
+    structure_of,
+    tree_structure,
+)
 
-RODS = 'rods'
+REVOLUTE, SPHERICAL, RODS = 'revolute', 'spherical', 'rods'  # the joints C_i and A_i, and the rods
 POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.
 MOST_CONDITIONS = 64
-# Samples up to which everything is stored with the forces: a node checks the drives' motion before
-# it answers; of a recording, writing it would take longer than calculating it where it is needed.
-SHORT = 2048
 
 
 class SingularityBounds(NamedTuple):
@@ -196,23 +198,6 @@ class ClosedForm:
                 f'limits.condition_number is {bounds.condition_number:g}')
 
 
-class PassResult(NamedTuple):
-    """Results of one pass: tables of `closed_form`, of long motions of the forces alone."""
-
-    efforts: Array
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether there are more tables than those of forces."""
-        return len(self.efforts) > closed_form.FORCES
-
-    @property
-    def drive_motion(self) -> Any:
-        """A function that returns the drives' motion, None where it is not known."""
-        first = closed_form.POSITION
-        return (lambda: tuple(self.efforts[first:first + 3])) if self.is_complete else None
-
-
 def condition_number(geometry: Geometry, J: Array) -> Array:
     """Return the condition number of the drive Jacobian, (N,).
 
@@ -240,7 +225,7 @@ class ThreePprs:
     masses : Masses
     gravity : 3 floats
         Gravity acceleration in `base` [m/s^2].
-    radii : 2 floats
+    radii : mapping of str to float
         At which loads of C_i and A_i rub [m], where known.
     bounds : SingularityBounds
     printed : bool
@@ -250,7 +235,7 @@ class ThreePprs:
     geometry: Geometry
     masses: Masses
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-    radii: tuple[float, float] = (0.0, 0.0)
+    radii: Mapping[str, float] = field(default_factory=dict)
     bounds: SingularityBounds = UNBOUNDED
     printed: bool = False
 
@@ -266,9 +251,8 @@ class ThreePprs:
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """The joints C_i, and the joints A_i."""
-        revolute, spherical = self.radii
-        return (PassiveJoint(REVOLUTE, revolute),
-                PassiveJoint(SPHERICAL, spherical, has_position=False))
+        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE)
+                     for name in (REVOLUTE, SPHERICAL))
 
     @property
     def tool_place(self) -> BodyPlace:
@@ -286,11 +270,6 @@ class ThreePprs:
         return self.masses.total
 
     @property
-    def numbers(self) -> Array:
-        """All numbers that determine the forces, in one row."""
-        return row_of(self.kernel_parameters)
-
-    @property
     def position_step(self) -> float:
         """Step of a drive for derivatives by its position [m]."""
         return POSITION_STEP * self.geometry.rod_length
@@ -301,7 +280,9 @@ class ThreePprs:
 
         Only the model's own may be printed.
         """
-        return Joints.of(blocks, reversal.rate, is_own and self.printed)
+        return Joints(reversal.rate, float(is_own and self.printed), *(
+            blocks.get(joint, {}).get(key, 0.0) for joint in (REVOLUTE, SPHERICAL)
+            for key in ('viscous', 'torque', 'coulomb', 'radius')))
 
     def heavier(self, link: str, mass: float) -> ThreePprs:
         """Return the robot with a payload, or with rods, that weigh more [kg].
@@ -324,15 +305,18 @@ class ThreePprs:
         return replace(self, masses=altered)
 
     @cached_property
-    def kernel_parameters(self) -> RobotParameters:
-        """Geometry, masses and gravity."""
-        masses = self.masses
-        first, second, third = (ChainMasses(*chain) for chain in zip(
-            masses.slides, masses.lifts, masses.rods, strict=True))
-        body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
-                            Vector(*masses.inertia[3:]))
-        return RobotParameters(self.geometry.kernel_parameters, body, (first, second, third),
-                               Vector(*self.gravity))
+    def _chains(self) -> tuple[Chain, ...]:
+        """Constants of the chains."""
+        geometry, masses = self.geometry, self.masses
+        delta = np.asarray(geometry.chain_angles)
+        cos, sin = np.cos(delta), np.sin(delta)
+        joints = geometry.platform_radius * np.exp(1j * np.asarray(geometry.platform_angles))
+        left = np.linalg.pinv(np.stack((-sin, cos), axis=1))
+        # The weights with which the three directions n_i add up to nothing.
+        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
+        constants = np.stack((cos, sin, joints.real, joints.imag, *left, balance, masses.slides,
+                              masses.lifts, masses.rods), axis=1)
+        return tuple(Chain(*chain) for chain in constants.tolist())
 
     def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
         """Return the parameters of `closed_form.forces`, for `one_pass`.
@@ -343,23 +327,26 @@ class ThreePprs:
         drives : (OF_DRIVE, 6) array, optional
             Without it the drives have no friction.
         """
-        friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
+        geometry, masses, bounds = self.geometry, self.masses, self.bounds
+        friction = FRICTIONLESS_DRIVES if drives is None else tuple(
             DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist())
-        return row_of(closed_form.ForcesParameters(
-            self.kernel_parameters, self.geometry.platform_radius, float(self.printed),
-            self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, friction))
+        first, second, third = self._chains
+        return row_of(Parameters(
+            geometry.base_radius, geometry.rod_length, geometry.platform_radius,
+            geometry.elbow_sign, (first, second, third), masses.total, Vector(*masses.centre),
+            Vector(*masses.inertia[:3]), Vector(*masses.inertia[3:]), Vector(*self.gravity),
+            float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
 
     def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
-                 ) -> PassResult | None:
+                 ) -> InverseDynamicsResult | None:
         """Return the forces for a motion, friction included.
 
         None where a sample may be out of reach or too near a singularity.
         """
-        rows = motion.rows
-        table = np.empty((closed_form.EVERYTHING if len(rows) <= SHORT else closed_form.FORCES,
-                          len(rows), 6))
-        first = run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table)
-        return PassResult(table) if first < 0 else None
+        table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+        if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
+            return None
+        return InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
@@ -415,7 +402,8 @@ class ThreePprs:
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
     def state(self, motion: PlatformMotion, reversal: Reversal, friction: object = None,
-              closed: object = None, found: PassResult | None = None) -> MechanismState:
+              closed: object = None, found: InverseDynamicsResult | None = None,
+              ) -> MechanismState:
         """Return the state for a platform motion; `found` as of `one_pass`.
 
         Raises
@@ -427,8 +415,7 @@ class ThreePprs:
         """
         # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            links = ClosedForm(self, motion, table=(
-                found.efforts if found is not None and found.is_complete else None))
+            links = ClosedForm(self, motion, table=None if found is None else found.efforts)
             if not links.is_regular:
                 links.require_regular()
         return MechanismState(links.position, links.velocity, links.acceleration, motion.time,

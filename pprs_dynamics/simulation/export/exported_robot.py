@@ -5,20 +5,189 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, principal_inertia
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
+from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
+from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, Loop, principal_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.export.expressed import URDF, Expressed, express
+from pprs_dynamics.physics.model.keys import APPROACHES
+
+MJCF, URDF = 'mjcf', 'urdf'
+FORMATS = (URDF, MJCF)
+DAMPING, FRICTION, ARMATURE, STIFFNESS = 'damping', 'frictionloss', 'armature', 'stiffness'
+SPRINGREF = 'springref'
+# What joints of a format have.
+HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
+HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
+# Of effects on drives: their parameters as a joint's.
+OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
+    ViscousFriction: {'coefficient': DAMPING},
+    CoulombFriction: {'force': FRICTION},
+    DriveInertia: {'mass': ARMATURE},
+    DriveSpring: {'stiffness': STIFFNESS, 'position': SPRINGREF},
+}
+OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
+              'position': SPRINGREF}
+# By joint, the numbers that a format names.
+Joints = dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Expressed:
+    """A model as far as a format can hold it.
+
+    Parameters
+    ----------
+    model : DriveModel
+        The whole one.
+    robot : Mechanism or ThreePprs
+        With the bodies and the gravity that the format holds.
+    joints : dict of str to dict of str to float
+        Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
+        it has them.
+    not_expressed : tuple of str
+        Keys of the model file and names of effects; of robots with loops in URDF, their loops.
+    """
+
+    model: DriveModel
+    robot: Any
+    joints: Joints
+    not_expressed: tuple[str, ...]
+
+
+def express(model: DriveModel, kind: str) -> Expressed:
+    """Return what a format can hold of a model.
+
+    Parameters
+    ----------
+    model : DriveModel
+    kind : {'urdf', 'mjcf'}
+    """
+    joints: Joints = {}
+    left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
+            if not _take(joints, numbers, HELD[kind])]
+    # Joints of a format that passive joints of the model are; those without do not turn alone.
+    passive = {one.name: (one.name,) if model.moves_joints else HINGES
+               for one in model.robot.passive_joints if one.has_position}
+    robot = model.robot
+    for effect in model.effects:
+        if effect.name not in model.values.get('effects.active', ()):
+            continue
+        if _is_body(effect, kind, robot):
+            assert isinstance(effect, BodyEffect)
+            robot = effect.changed(robot)
+        elif not _take(joints, _of_effect(effect, passive), HELD[kind]):
+            left.append(effect.name)
+    if kind == URDF:
+        if tuple(model.robot.gravity) != STANDARD_GRAVITY:
+            left.append('robot.gravity' if model.moves_joints else 'gravity')
+        robot = replace(robot, gravity=STANDARD_GRAVITY)
+        left += ([loop.name for loop in model.robot.structure.loops] if model.moves_joints
+                 else list(BALLS))
+    return Expressed(model, robot, {
+        name: {key: value for key, value in numbers.items() if value}
+        for name, numbers in joints.items()}, tuple(left))
+
+
+def _take(joints: Joints, numbers: Joints | None, held: set[str]) -> bool:
+    """Add numbers to joints; False, with nothing added, where the format cannot hold them."""
+    if numbers is None:
+        return False
+    added = {name: {key: value + joints.get(name, {}).get(key, 0.0)
+                    for key, value in own.items() if value} for name, own in numbers.items()}
+    # No simulator takes a joint that gives power without end.
+    if any(key not in held or (value < 0 and key != SPRINGREF)
+           for own in added.values() for key, value in own.items()):
+        return False
+    for name, own in added.items():
+        joints.setdefault(name, {}).update(own)
+    return True
+
+
+def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+    """Yield keys of the paper's friction and their numbers; None for loads, which no format has."""
+    values = model.values
+    yield 'friction.drives.viscous', _spread(model, 'friction.drives.viscous', DAMPING)
+    yield ('friction.revolute.viscous',
+           {name: {DAMPING: values['friction.revolute.viscous']} for name in HINGES})
+    for key in ('friction.drives.coulomb', *(
+            f'friction.{joint}.coulomb' for joint in ('revolute', 'spherical')
+            if values[f'friction.{joint}.diameter']), 'friction.spherical.viscous'):
+        if np.any(values[key]):
+            yield key, None
+    if values['friction.approach'] != APPROACHES[0]:
+        yield 'friction.approach', None
+    if values['equations'] != 'corrected':
+        yield 'equations', None
+
+
+def _of_arm(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+    """Yield keys of rotors and friction, also of passive joints; None for those of no format."""
+    yield 'friction.viscous', _spread(model, 'friction.viscous', DAMPING)
+    yield 'friction.coulomb', _spread(model, 'friction.coulomb', FRICTION)
+    if np.any(model.values['friction.offset']):
+        yield 'friction.offset', None
+    yield 'robot.armature', _spread(model, 'robot.armature', ARMATURE)
+    loops = {loop.name for loop in model.robot.structure.loops}
+    for key, value in model.values.items():
+        name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
+        if key.startswith('friction.joints.') and parameter != 'radius' and value:
+            number = None if name in loops else OF_PASSIVE.get(parameter)
+            yield key, None if number is None else {name: {number: value}}
+
+
+def _spread(model: DriveModel, key: str, number: str) -> Joints:
+    """Return the numbers of all drives, or the number that is the same in all."""
+    values = np.broadcast_to(np.asarray(model.values[key], dtype=float), len(model.drives))
+    return {drive: {number: value}
+            for drive, value in zip(model.drives, values.tolist(), strict=True)}
+
+
+def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Joints | None:
+    """Return the numbers of an effect in drives or passive joints, None where it has others."""
+    if isinstance(effect, DriveEffect) and type(effect) in OF_DRIVES:
+        names = OF_DRIVES[type(effect)]
+        return {drive: {names[key]: value for key, value in values.items()}
+                for drive, values in effect.drives.items()}
+    if not isinstance(effect, (JointFrictionEffect, JointSpring)):
+        return None
+    joints: Joints = {}
+    for key, value in effect.values.items():
+        joint, _, parameter = key.rpartition('.')
+        if value and (joint not in passive or parameter not in OF_PASSIVE):
+            return None
+        for name in passive.get(joint, ()) if value else ():
+            joints.setdefault(name, {})[OF_PASSIVE[parameter]] = value
+    return joints
+
+
+def _is_body(effect: Effect, kind: str, robot: Any) -> bool:
+    """Return whether an effect changes bodies and adds no force; in URDF, not gravity either."""
+    return (isinstance(effect, BodyEffect) and type(effect).load is BodyEffect.load
+            and type(effect).apply is BodyEffect.apply
+            and (kind == MJCF or effect.changed(robot).gravity == robot.gravity))
+
 
 FREE, HINGE, SLIDE = 'free', 'hinge', 'slide'
 # Simulators want some mass of everything that moves [kg, kg m^2]; ten decimals below real ones.
@@ -230,3 +399,235 @@ class TreePositions:
             bodies[k, :3] = state.motion.p[0, row]
             bodies[k, 3:] = Rotation.from_matrix(state.motion.R[0, row]).as_quat()
         return TreePose(t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows], bodies)
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+THICKNESS = 0.02  # of the mechanism's size, of what is drawn
+UNLIMITED = 1e3  # [m, m/s, rad/s, N, N m], where URDF wants a limit and the model has none
+URDF_KINDS = {FREE: 'floating', HINGE: 'revolute', SLIDE: 'prismatic'}
+Element = ElementTree.Element
+
+
+def written(robot: ExportedRobot, kind: str) -> str:
+    """Return the text of a file.
+
+    Raises
+    ------
+    ModelError
+        For closures that MJCF does not have.
+    """
+    root = _mjcf(robot) if kind == MJCF else _urdf(robot)
+    ElementTree.indent(root)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+
+
+def _words(values: Any) -> str:
+    # + 0.0: no minus zeros.
+    return ' '.join(repr(float(value)) for value in np.asarray(values, dtype=float).ravel() + 0.0)
+
+
+def _add(parent: Element, tag: str, **attributes: Any) -> Element:
+    """Add an element; numbers become words, and what is None is left out."""
+    return ElementTree.SubElement(parent, tag, {
+        key: value if isinstance(value, str) else _words(value)
+        for key, value in attributes.items() if value is not None})
+
+
+def _drawn(robot: ExportedRobot) -> Mapping[int, list[Array]]:
+    """Return the points to which each body reaches, by row: joints and closures on it."""
+    structure = robot.mechanism.structure
+    t = structure.tables
+    points: dict[int, list[Array]] = {0: [], **{body.row: [] for body in robot.bodies}}
+    for body in robot.bodies:
+        if body.kind != FREE:
+            points[body.parent].append(body.frame.p)
+    for k in range(len(structure.loops)):
+        points[int(t.loop_a[k])].append(t.a_p[k])
+        points[int(t.loop_b[k])].append(t.b_p[k])
+    width = THICKNESS * structure.size
+    return {row: [point for point in those if np.linalg.norm(point) > width]
+            for row, those in points.items()}
+
+
+def _quaternion(R: Array) -> Array:
+    """Return w x y z."""
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(R).as_quat(), 1)
+
+
+def _rpy(R: Array) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw about fixed axes."""
+    return (math.atan2(R[2, 1], R[2, 2]), math.atan2(-R[2, 0], math.hypot(R[2, 1], R[2, 2])),
+            math.atan2(R[1, 0], R[0, 0]))
+
+
+def _mjcf(robot: ExportedRobot) -> Element:
+    structure = robot.mechanism.structure
+    root = Element('mujoco', model=robot.name)
+    _add(root, 'compiler', angle='radian', autolimits='true')
+    _add(root, 'option', gravity=robot.mechanism.gravity, jacobian='dense',
+         integrator='implicitfast')
+    world = _add(root, 'worldbody')
+    _add(world, 'light', pos='0 0 3', dir='0 0 -1')
+    elements = {0: world}
+    drawn, width = _drawn(robot), THICKNESS * structure.size
+    drives = dict(zip(structure.drives, structure.effort, strict=True))
+    for body in robot.bodies:
+        own = elements[body.row] = _add(elements[body.parent], 'body', name=body.name,
+                                        pos=body.frame.p, quat=_quaternion(body.frame.R))
+        _add(own, 'inertial', pos=body.centre, quat=_quaternion(body.axes), mass=body.mass,
+             diaginertia=body.moments)
+        if body.kind == FREE:
+            _add(own, 'freejoint', name=body.joint)
+        else:
+            joint = structure.description.joints[body.joint]
+            numbers = robot.joints.get(body.joint, {})
+            limited = math.isfinite(joint.lower) and math.isfinite(joint.upper)
+            _add(own, 'joint', name=body.joint, type=body.kind, axis=body.axis,
+                 range=(joint.lower, joint.upper) if limited else None,
+                 **{key: numbers.get(key) for key in (DAMPING, FRICTION, ARMATURE, STIFFNESS,
+                                                      SPRINGREF)})
+        for point in drawn[body.row]:
+            _add(own, 'geom', type='capsule', fromto=(0, 0, 0, *point), size=width / 2,
+                 contype='0', conaffinity='0', group='1')
+        if not drawn[body.row]:
+            _add(own, 'geom', type='sphere', size=width, contype='0', conaffinity='0', group='1')
+    for name, row, frame in robot.frames:
+        _add(elements[row], 'site', name=name, pos=frame.p, quat=_quaternion(frame.R))
+    _close(robot, elements, _add(root, 'equality'))
+    actuators = _add(root, 'actuator')
+    for name, effort in drives.items():
+        _add(actuators, 'motor', name=name, joint=name,
+             ctrlrange=(-effort, effort) if math.isfinite(effort) else None)
+    _add(_add(root, 'keyframe'), 'key', name='home', qpos=_home(robot.bodies))
+    return root
+
+
+def _home(bodies: tuple[Body, ...]) -> list[float]:
+    """Return positions of all joints, in the order in which the bodies stand in the file."""
+    below: dict[int, list[Body]] = {}
+    for body in bodies:
+        below.setdefault(body.parent, []).append(body)
+    positions: list[float] = []
+
+    def visit(row: int) -> None:
+        for body in below.get(row, []):
+            positions.extend((*body.frame.p, *_quaternion(body.frame.R)) if body.kind == FREE
+                             else (body.home,))
+            visit(body.row)
+
+    visit(0)
+    return positions
+
+
+def _close(robot: ExportedRobot, elements: Mapping[int, Element], equality: Element) -> None:
+    """Add sites and constraints for loops and couplings."""
+    structure = robot.mechanism.structure
+    for name, sites, weld in closures(structure):
+        for site, row, frame in sites:
+            _add(elements[row], 'site', name=site, pos=frame.p, quat=_quaternion(frame.R))
+        _add(equality, 'weld' if weld else 'connect', name=name, site1=sites[0][0],
+             site2=sites[1][0])
+    for name, leader, ratio, offset in structure.couplings:
+        _add(equality, 'joint', name=f'{name}_mimic', joint1=name, joint2=leader,
+             polycoef=(offset, ratio, 0, 0, 0))
+
+
+def closures(structure: Structure) -> list[tuple[str, list[tuple[str, int, Frame]], bool]]:
+    """Return MuJoCo's constraints for the loops: name, two sites by row and frame, is a weld.
+
+    A hinge is two points on its axis that stay together.
+
+    Raises
+    ------
+    ModelError
+        For a loop that is neither spherical nor revolute nor fixed.
+    """
+    found = []
+    t = structure.tables
+    for k, loop in enumerate(structure.loops):
+        sides = (('a', int(t.loop_a[k]), Frame(t.a_R[k], t.a_p[k])),
+                 ('b', int(t.loop_b[k]), Frame(t.b_R[k], t.b_p[k])))
+        for name, along in _points(loop, structure.size):
+            at = Frame(p=np.array([0.0, 0.0, along]))
+            found.append((name, [(f'{name}_{side}', row, frame @ at)
+                                 for side, row, frame in sides], loop.kind == 'fixed'))
+    return found
+
+
+def _points(loop: Loop, size: float) -> list[tuple[str, float]]:
+    if loop.kind in ('spherical', 'fixed'):
+        return [(loop.name, 0.0)]
+    if loop.kind == 'revolute':
+        return [(loop.name, 0.0), (f'{loop.name}_axis', size / 10)]
+    raise ModelError(f'robot.loops.{loop.name}.type', loop.kind,
+                     'be spherical, revolute or fixed: MuJoCo closes no other loops')
+
+
+def _urdf(robot: ExportedRobot) -> Element:
+    structure = robot.mechanism.structure
+    root = Element('robot', name=robot.name)
+    base = structure.moved_by[0]
+    names = {0: base, **{body.row: body.name for body in robot.bodies}}
+    drawn, width = _drawn(robot), THICKNESS * structure.size
+    _add(root, 'link', name=base)
+    mimics = {name: coupling for name, *coupling in structure.couplings}
+    for body in robot.bodies:
+        link = _add(root, 'link', name=body.name)
+        inertial = _add(link, 'inertial')
+        tensor = body.tensor
+        _add(inertial, 'origin', xyz=body.centre, rpy='0 0 0')
+        _add(inertial, 'mass', value=body.mass)
+        _add(inertial, 'inertia', ixx=tensor[0, 0], ixy=tensor[0, 1], ixz=tensor[0, 2],
+             iyy=tensor[1, 1], iyz=tensor[1, 2], izz=tensor[2, 2])
+        for point in drawn[body.row]:
+            _draw_rod(link, point, width)
+        if not drawn[body.row]:
+            _add(_add(_add(link, 'visual'), 'geometry'), 'sphere', radius=width)
+        _urdf_joint(root, robot, body, names[body.parent], mimics.get(body.joint))
+    for name, row, frame in robot.frames:
+        _add(root, 'link', name=name)
+        joint = _add(root, 'joint', name=f'{name}_fixed', type='fixed')
+        _add(joint, 'parent', link=names[row])
+        _add(joint, 'child', link=name)
+        _add(joint, 'origin', xyz=frame.p, rpy=_rpy(frame.R))
+    return root
+
+
+def _urdf_joint(root: Element, robot: ExportedRobot, body: Body, parent: str,
+                mimic: list[Any] | None) -> None:
+    joint = _add(root, 'joint', name=body.joint, type=URDF_KINDS[body.kind])
+    _add(joint, 'parent', link=parent)
+    _add(joint, 'child', link=body.name)
+    _add(joint, 'origin', xyz=body.frame.p, rpy=_rpy(body.frame.R))
+    if body.kind == FREE:
+        return
+    _add(joint, 'axis', xyz=body.axis)
+    said = robot.mechanism.structure.description.joints[body.joint]
+    limited = math.isfinite(said.lower) and math.isfinite(said.upper)
+    if not limited and body.kind == HINGE and mimic is None:
+        joint.set('type', 'continuous')
+    speed, effort = (value if math.isfinite(value) else UNLIMITED
+                     for value in (said.speed, said.effort))
+    _add(joint, 'limit', lower=said.lower if limited else -UNLIMITED,
+         upper=said.upper if limited else UNLIMITED, velocity=speed, effort=effort)
+    numbers = robot.joints.get(body.joint, {})
+    if numbers:
+        _add(joint, 'dynamics', damping=numbers.get(DAMPING, 0.0),
+             friction=numbers.get(FRICTION, 0.0))
+    if mimic is not None:
+        leader, ratio, offset = mimic
+        _add(joint, 'mimic', joint=leader, multiplier=ratio, offset=offset)
+
+
+def _draw_rod(link: Element, point: Array, width: float) -> None:
+    """Draw a rod from the link's origin to a point."""
+    length = float(np.linalg.norm(point))
+    x, y, z = point / length
+    visual = _add(link, 'visual')
+    # URDF's cylinders lie along z.
+    _add(visual, 'origin', xyz=point / 2, rpy=(0.0, math.acos(max(-1.0, min(1.0, z))),
+                                               math.atan2(y, x)))
+    _add(_add(visual, 'geometry'), 'cylinder', radius=width / 2, length=length)

@@ -20,10 +20,8 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState
-from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
-from pprs_dynamics.simulation.export.expressed import MJCF
-from pprs_dynamics.simulation.export.writers import closures
+from pprs_dynamics.simulation.engine_loops import EngineState
+from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot, closures
 from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.

@@ -16,9 +16,8 @@ from collections.abc import Hashable
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, other_exponent
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 FORCES = ('force_forward', 'force_backward')
 VISCOUS = ('viscous_forward', 'viscous_backward')

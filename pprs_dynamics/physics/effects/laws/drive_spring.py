@@ -8,6 +8,7 @@ It is linear in the stiffness k and the force at q = 0, -k q_0, so that is what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,7 +16,19 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
+
+FARTHEST = 1000.0  # [m, rad], of the relaxed position: from there a spring is a constant force
+
+
+def relaxed_position(k: float, force: float) -> tuple[float, float]:
+    """Return k and q_0 = -force / k.
+
+    A force with next to no stiffness becomes the softest spring that reaches it from the farthest
+    position allowed.
+    """
+    k = math.copysign(max(abs(k), abs(force) / FARTHEST), k)
+    position = 0.0 - force / k if k else 0.0
+    return k, max(-FARTHEST, min(FARTHEST, position))
 
 
 class DriveSpring(DriveEffect):

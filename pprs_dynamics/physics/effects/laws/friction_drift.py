@@ -18,7 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.first_order import first_order
+from pprs_dynamics.physics.effects.laws.effort_filter import first_order
 
 
 class FrictionDrift(DriveEffect):

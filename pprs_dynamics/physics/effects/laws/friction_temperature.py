@@ -14,9 +14,13 @@ from typing import ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import (
+    DriveEffect,
+    DriveRange,
+    DriveSamples,
+    other_exponent,
+)
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 TEMPERATURE = 'temperature'
 # Lubricants lose a factor e of their viscosity in 15 to 40 K: what is tried of it.

@@ -6,9 +6,8 @@
 from __future__ import annotations
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, other_exponent
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 
 class GearEfficiency(DriveEffect):

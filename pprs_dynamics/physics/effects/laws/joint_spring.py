@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
+from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.physics.effects.added_body import AddedBody
+from pprs_dynamics.physics.effects.structure_effect import AddedBody
 from pprs_dynamics.physics.mechanism.alike import alike_links
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 

@@ -6,9 +6,13 @@
 from __future__ import annotations
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import (
+    DriveEffect,
+    DriveRange,
+    DriveSamples,
+    other_exponent,
+)
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 # Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
 # power 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from pprs_dynamics.physics.effects.added_body import AddedBody, body_parameters
+from pprs_dynamics.physics.effects.structure_effect import AddedBody, body_parameters
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, BodyPlace
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.relaxed_position import FARTHEST
+from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST
 
 # Where stops are tried, in strokes from either end. Over more of the stroke than the last it is a
 # spring that comes loose, which a spring with lack of fit explains as well.

@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, other_exponent
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 DIRECTIONS = 0.1  # share by which real viscous friction differs by direction
 

@@ -20,6 +20,31 @@ from typing import IO
 
 from pprs_dynamics.errors import UnreadableFileError
 
+
+def require_file(path: str | PathLike[str]) -> None:
+    """Raise UnreadableFileError where a path is nothing that can be read to its end."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    if not stat.S_ISREG(mode):
+        raise UnreadableFileError(path, f'it is {kind_of(mode)}, must be a file')
+
+
+def require_files(model: str, parameters: str) -> list[str]:
+    """Return a launch's model file and its further file of parameters, '' for none.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where one is no file: launch would leave it out, in a line among many.
+    """
+    files = [model, *([parameters] if parameters else [])]
+    for file in files:
+        require_file(file)
+    return files
+
+
 # Of what is not finished. Short: with the target's own name it could be too long.
 PREFIX = '.pprs_'
 KINDS = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',

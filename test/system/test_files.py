@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.input_files import require_file
-from pprs_dynamics.system.output_files import new_file, new_folder, write_text
+from pprs_dynamics.system.files import new_file, new_folder, require_file, write_text
 
 
 def a_socket(path: Path) -> None:
