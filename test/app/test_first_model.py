@@ -264,6 +264,20 @@ def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path
             first_model(tmp_path / 'x.urdf')
 
 
+def test_joints_that_only_numbers_match_are_a_question(tmp_path: Path) -> None:
+    (tmp_path / 'arm.urdf').write_text(f'<robot name="arm">{urdf(("j_1", "j_2", "j_3"))}</robot>')
+    first = first_model(tmp_path / 'arm.urdf', bag(tmp_path, ('leg1', 'leg2', 'leg3')),
+                        tmp_path / 'robot.yaml')
+    assert 'matched by their numbers alone' in ' '.join(first.questions)
+    assert 'joint_map: {j_1: leg1' in ' '.join(first.questions)
+
+
+def test_a_recording_in_place_of_the_description_is_named_as_such(tmp_path: Path) -> None:
+    (tmp_path / 'run.csv').write_text('time,a/position\n0,0\n')
+    with pytest.raises(UnreadableFileError, match='description of the robot first'):
+        first_model(tmp_path / 'run.csv')
+
+
 MJCF = '''<mujoco><worldbody><body name="crank"><joint name="motor" axis="0 1 0"/>
 <geom type="capsule" fromto="0 0 0 0 0 0.1" size="0.01"/>
 <body name="coupler" pos="0 0 0.1"><joint name="knee" axis="0 1 0"/>

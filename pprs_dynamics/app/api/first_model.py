@@ -164,9 +164,9 @@ def first_model(
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
                      'to drive them, list them with friction: {motors: …}')
+    by_numbers = False
     if contents.joints and not names.joints:
-        names = _by_numbers(contents, chosen)
-        notes.append('joints are matched by the numbers in their names')
+        names, by_numbers = _by_numbers(contents, chosen), True
     draft = _Draft(path, Path(output), is_mjcf, description, base or root_of(description), branch,
                    chosen, names, [file.name for file in given])
     if given:
@@ -180,6 +180,10 @@ def first_model(
     has_efforts = bool({EFFORT, CURRENT} & draft.kinds) and EXTERNAL not in draft.kinds
     if given and not draft.questions:
         notes += _correct(draft, given[0])
+    if by_numbers:
+        draft.questions.append(
+            f'the joints of {given[0].name} are matched by their numbers alone: if it is a '
+            f'recording of this robot, keep joint_map: {_yaml(names.joints)}')
     if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
                      f'{draft.output.name}')
@@ -223,7 +227,9 @@ def _root_tag(path: Path) -> str:
     try:
         return ElementTree.fromstring(expanded(str(path))).tag
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise UnreadableFileError(path, f'no URDF or MJCF, it is not XML: {error}') from None
+        raise UnreadableFileError(
+            path, 'no URDF or MJCF: name the description of the robot first, then recordings, as '
+            f'in pprs init robot.urdf run.mcap (it is not XML: {error})') from None
 
 
 def _description(path: Path, is_mjcf: bool) -> Description:
