@@ -582,8 +582,6 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
             return (), 'joint_map: {' + ', '.join(
                 f'{scalar(drives[k])}: {scalar(joints[moved[0][1][k]])}'
                 for k in reading.drives) + '}'
-        if ', ' in recording.source:  # of a topic: its columns cannot be named
-            return (), ''
         known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
         names = {drive: {key: f'{joint}/{key}' for key in known}
                  for drive, joint in zip(drives, joints, strict=True)}
