@@ -150,9 +150,10 @@ def _without_unit(title: str) -> tuple[list[str], tuple[str, float] | None]:
     words = _words(title)
     for length in (2, 1):
         for at in range(len(words) - length, -1, -1):
-            name = '/'.join(words[at:at + length])
+            some = words[at:at + length]
             # Single letters are units in brackets alone.
-            if len(words[at]) > 1 and (unit := _unit(name)):
+            if (len(some[0]) > 1 or not some[0].isalpha()) and (
+                    unit := _unit('/'.join(some)) or _unit(''.join(some))):
                 return words[:at] + words[at + length:], unit
     return words, None
 
@@ -164,12 +165,16 @@ def _unit(name: str) -> tuple[str, float] | None:
 
 def _words(text: str) -> list[str]:
     parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', text.replace('_', ' '))  # not in mA
-    return [each for word in re.findall(r'[^\W\d_]+|\d+', parts.lower()) for each in _split(word)]
+    found = re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower())
+    return [each for word in found for each in _split(word)]
 
 
 def _split(word: str) -> list[str]:
     """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
     known = {each for words in table.WORDS.values() for each in words}
+    for prefix in ('ist', 'soll'):  # Istposition
+        if word.startswith(prefix) and word.removeprefix(prefix) in known:
+            return [prefix, word.removeprefix(prefix)]
     if word[:-1] in known and (len(word) > 3 or word[0] in 'qd') and word not in (
             known | table.OTHERS) and word[-1] in table.LETTERS:
         return [word[:-1], table.LETTERS[word[-1]]]
@@ -261,17 +266,17 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         for one in series:
             groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
     columns: dict[tuple[str, str], Column] = {}
-    commanded = False
+    currents_are_measured = False
     wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
     for each in wanted:
         best = max(groups, key=lambda key: _fit(key, groups[key], each, quantity), default=None)
         if best is None or _fit(best, groups[best], each, quantity)[0] <= 0:
             continue
-        # Efforts come before currents, but what was measured before commands.
-        if each == EFFORT and {*best} & table.COMMANDS and any(
-                kind == CURRENT for _, kind in columns) and not commanded:
+        # Efforts come before currents, but what was measured before all else.
+        is_measured = not {*best} & (table.COMMANDS | table.FROM_OUTSIDE)
+        if each == EFFORT and not is_measured and currents_are_measured:
             continue
-        commanded = bool({*best} & table.COMMANDS)
+        currents_are_measured = each == CURRENT and is_measured
         best = _last_of(best, [key for key in groups if _fit(key, groups[key], each, quantity)
                                == _fit(best, groups[best], each, quantity)], groups, series)
         if {*best} & table.COMMANDS:
@@ -314,9 +319,14 @@ def _lag(values: Array, other: Array) -> int | None:
 def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
          ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
-    told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key} or {
-        kind for kind, words in table.WORDS.items() if {*key} & {*words}}
-    if not told and {*key} & table.OF_JOINTS:
+    told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
+    for words in ({word for word in key if len(word) > 1}, {*key}):
+        # A single letter beside a word is a prefix of programmers.
+        told = told or {kind for kind, known in table.WORDS.items() if words & {*known}}
+    is_german = bool({*key} & {'ist', 'soll'})
+    if not told and is_german and 'm' in key:
+        told.add(EFFORT)
+    if not told and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
         told.add(POSITION)  # "joint torque" is no position
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
@@ -607,7 +617,8 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
 
 def _scale(title: str, quantity: str) -> float | None:
     unit = unit_of(title)
-    return unit[1] if unit and unit[0] == quantity and unit[1] != 1 else None
+    return unit[1] if unit and unit[1] != 1 and (
+        unit[0] == quantity or (unit[0] == table.SHARE and quantity == EFFORT)) else None
 
 
 def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None) -> Guess:

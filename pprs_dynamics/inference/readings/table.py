@@ -40,7 +40,7 @@ OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
-SHARES = {0.01: 'percent', 1e-3: 'per mille'}
+SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 EITHER = 'kgf cm or amperes'
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
 # Directions of gravity in the base of a robot on a wall or under a ceiling.
@@ -110,10 +110,10 @@ POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current
 WORDS = {
     POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
                'enc', 'encoder', 'ticks', 'winkel', 'lage'),
-    VELOCITY: ('velocity', 'velocities', 'vel', 'dq', 'qd', 'qdot', 'dtheta', 'speed', 'omega',
-               'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
-    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'force', 'moment', 'load',
-             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
+    VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
+               'omega', 'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
+    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'torq', 'force', 'moment',
+             'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
 }
@@ -134,12 +134,12 @@ COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
-FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
+FROM_OUTSIDE = frozenset(('ext', 'external', 'contact', 'dist', 'disturbance'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
     'link'))
-TIME, NEITHER = 'time', 'neither'
+TIME, SHARE, NEITHER = 'time', 'share', 'neither'
 # Units in titles, in lower case and without signs between their letters, and their factors to SI.
 UNITS = {
     POSITION: {'rad': 1.0, 'mrad': 1e-3, 'm': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'um': 1e-6, 'µm': 1e-6,
@@ -155,6 +155,7 @@ UNITS = {
              0.1129848), **dict.fromkeys(('kgfcm', 'kgcm'), 0.0980665),
              **dict.fromkeys(('lbfft', 'ftlb'), 1.3558179), 'ozin': 7.0615518e-3},
     CURRENT: {'a': 1.0, 'ma': 1e-3},
+    SHARE: {'%': 0.01, '‰': 1e-3},
     TIME: {**dict.fromkeys(('s', 'sec'), 1.0),
            **dict.fromkeys(('ms', 'msec', 'millis', 'milliseconds'), 1e-3),
            **dict.fromkeys(('us', 'µs', 'usec', 'micros', 'microseconds'), 1e-6),
@@ -184,6 +185,7 @@ NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
 RATE_OFF = 0.03  # relative error of a sampling rate that is reported
 
 MOST_PERMUTED = 4  # drives of which all orders are tried
+MOST_TURNED = 3  # drives of which two zeros at a time are tried
 
 
 @dataclass(frozen=True)

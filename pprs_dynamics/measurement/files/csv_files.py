@@ -42,7 +42,7 @@ REMARKS = ('#', '%', 'sep=')  # lines that may stand above a table
 ZSTANDARD = ('.zst', '.zstd')
 LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
-NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
+NO_NUMBERS = ['', 'nan', 'NaN', 'NAN', 'N/A', 'NA', 'null', 'NULL', 'None']
 PREAMBLE = 20  # lines that may stand above a table
 NO_TEXT = ('not a recording, must be a bag (rosbag2, .mcap, .db3, ROS 1) or a table (.csv, '
            '.parquet, .mat, .npz, .json)')
@@ -120,11 +120,16 @@ class CsvTable:
                 if line.strip() and number >= remarks else []
                 for number, line in enumerate(lines, 1)]
 
+        def words(k: int) -> list[int]:
+            """Return the places of a row's words, as names and states of a log are."""
+            return [at for at, cell in enumerate(rows[k]) if not _is_value(cell, decimal)]
+
         def is_row(k: int) -> bool:
-            return any(rows[k]) and all(_is_value(cell, decimal) for cell in rows[k])
+            return any(rows[k]) and 2 * len(words(k)) < len(rows[k])
 
         first = next((k for k in range(remarks, len(rows) - 1) if is_row(k) and is_row(k + 1)
-                      and 1 < len(rows[k]) == len(rows[k + 1])), remarks)
+                      and 1 < len(rows[k]) == len(rows[k + 1]) and words(k) == words(k + 1)),
+                     remarks)
         if first == remarks and not is_row(remarks):
             first += 1
         sample = rows[first] if first < len(rows) else []
@@ -136,9 +141,9 @@ class CsvTable:
         return cls(path, separator, decimal, names, count, first, sample, heads)
 
     @property
-    def is_numeric(self) -> bool:
-        """Whether the first row holds numbers and dates."""
-        return any(self.sample) and all(_is_value(cell, self.decimal) for cell in self.sample)
+    def numbers(self) -> int:
+        """How many cells of the first row hold numbers or dates."""
+        return sum(bool(cell) and _is_value(cell, self.decimal) for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.
@@ -186,7 +191,7 @@ class CsvTable:
         for k, values in enumerate(np.array(found).T):
             if np.isfinite(values).any():
                 name = self.names[k] if self.names else ''
-                yield Series(name or k + 1, name, values)
+                yield Series(name if self.names.count(name) == 1 and name else k + 1, name, values)
 
     def _any(self, cell: str) -> float:
         try:
