@@ -18,7 +18,6 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_described
@@ -38,6 +37,7 @@ from pprs_dynamics.ros.node.provenance import arguments_of
 from pprs_dynamics.ros.node.qos import publisher
 from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.simulation.injection import draw_motion
+from pprs_dynamics.simulation.motion_files import read_poses
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
 ACKNOWLEDGED = Duration(seconds=4.0)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Small CSV files, and CSV files of numbers to be written."""
+"""CSV files of numbers to be written."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from os import PathLike
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.files import new_file, require_file
+from pprs_dynamics.system.files import new_file
 
 ROWS = 10_000  # written at a time
 
@@ -36,22 +35,3 @@ def write_table(path: str | PathLike[str], header: Sequence[str], columns: Seque
             rows = np.column_stack([values[start:start + ROWS] for values in columns]).tolist()
             text = '\n'.join([','.join(map(repr, row)) for row in rows]) + '\n'
             file.write(text.replace('nan', '').encode())
-
-
-def read_rows(path: str | PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Return the rows of a small CSV file and the numbers of their lines, empty rows left out.
-
-    Raises
-    ------
-    UnreadableFileError
-        If it cannot be read, or a quote has no pair.
-    """
-    require_file(path)
-    try:
-        with open(path, encoding='utf-8-sig', newline='') as file:
-            reader = csv.reader(file, strict=True)
-            return [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise UnreadableFileError(path, f'is no CSV text in UTF-8 ({error})') from None

@@ -16,13 +16,14 @@ from single_axis import AXIS, TIME, Effects, axis, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion, compare
 from pprs_dynamics.inference.adoption.loop import adopt_all
-from pprs_dynamics.inference.diagnosis.answer import rival_effects
+from pprs_dynamics.inference.diagnosis.answer import Answer, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.table import ModelTable
+from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 
 NOISE = 0.1  # [N]
@@ -100,6 +101,18 @@ def test_reported_effects_lower_the_error_held_out_too(name: str) -> None:
         rms(measure_residuals(found.adopted, [run])[0]), rel=1e-3)
     assert other.effects[0].held_out_after == pytest.approx(
         rms(measure_residuals(other.adopted, [recorded(name, 2)])[0]), rel=1e-3)
+
+
+def test_where_the_error_is_above_the_noise_nothing_is_advised_for_adoption() -> None:
+    table = table_of(diagnosed('two', 1))
+    fits, fitted = table.best.fits, table.best.fitted
+    friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
+    row = Row(fits, fits.evaluate(fitted.without(friction)), 0.0)
+    found = Answer(table, row, ()).diagnosis()
+    assert [one.name for one in found.effects] == ['drive_inertia']
+    assert found.above_noise[AXIS] > 0.9 * np.std(found.remaining) / NOISE > 5
+    assert found.verdict == 'unknown'
+    assert next_step(found, GivenFiles(('run.csv',)))[1].startswith('pprs diagnose run.csv')
 
 
 @pytest.mark.parametrize('name', HIDDEN)

@@ -16,7 +16,9 @@ from made_up_files import ARM, arm_efforts, drawn, motion
 
 from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.bag_files import write_bag
 from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.samples import Samples
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 
@@ -42,17 +44,23 @@ def outcome(folder: Path, seed: int) -> str:
     return 'right' if np.allclose(found.effort, effort, rtol=1e-3, atol=0.01) else 'effort'
 
 
-@pytest.mark.parametrize('names', ['position effort', 'effort'])
-def test_the_line_for_exchanged_drives_reads_them_rightly(names: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize('suffix', ['csv', 'mcap'])
+@pytest.mark.parametrize('names', ['position effort', 'effort', 'position'])
+def test_the_line_for_exchanged_drives_reads_them_rightly(names: str, suffix: str, tmp_path: Path,
+                                                          ) -> None:
     time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
     effort = arm_efforts(q, v, a) + np.random.default_rng(4).normal(0, 0.03, q.shape)
     (tmp_path / 'robot.urdf').write_text(ARM)
-    columns = {f'{joint}/{quantity}': values[:, 1 - k if quantity in names else k]
-               for quantity, values in (('position', q), ('effort', effort))
-               for k, joint in enumerate(('shoulder', 'elbow'))}
-    path = tmp_path / 'run.csv'
-    np.savetxt(path, np.column_stack([time, *columns.values()]), delimiter=',', comments='',
-               header=','.join(('time', *columns)))
+    joints = ('shoulder', 'elbow')
+    position, other = (values[:, ::-1] if quantity in names else values
+                       for quantity, values in (('position', q), ('effort', effort)))
+    path = tmp_path / f'run.{suffix}'
+    if suffix == 'mcap':
+        write_bag(path, {'/joint_states': Samples(joints, time, position, None, other)})
+    else:
+        np.savetxt(path, np.column_stack([time, position, other]), delimiter=',', comments='',
+                   header=','.join(('time', *(f'{joint}/{quantity}' for quantity in (
+                       'position', 'effort') for joint in joints))))
     first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
     line = first.questions[0].partition('write ')[2]
     model = DriveModel.from_parameters(parse_parameters(

@@ -320,6 +320,21 @@ def test_efforts_that_are_cut_off_are_left_out(both: bool) -> None:
     assert known.max() < limit
 
 
+@pytest.mark.parametrize('kept', [0.03, 0.4])
+def test_a_drive_whose_efforts_are_nearly_all_cut_off_is_not_judged(kept: float) -> None:
+    arrays = measured()
+    limit = float(np.quantile(np.abs(arrays['effort'][:, 1]), kept))
+    arrays['effort'][:, 1] = np.clip(arrays['effort'][:, 1], -limit, limit)
+    recording = judged(arrays)
+    is_lost = kept < 0.1
+    finding = the(recording, 'mostly_saturated' if is_lost else 'saturated_effort')
+    assert finding.drives == ('slide_2',)
+    assert ('too few efforts remain to judge this drive' in finding.text) == is_lost
+    assert np.isnan(recording.effort[:, 1]).mean() == pytest.approx(
+        1.0 if is_lost else 1 - kept, abs=0.01)
+    assert np.isfinite(recording.effort[:, [0, 2, 3, 4, 5]]).all()
+
+
 def test_repeated_messages_are_told() -> None:
     arrays = measured()
     for name in QUANTITIES:

@@ -111,6 +111,19 @@ def test_stamps_since_1970_are_told_by_their_size(
     assert_read(read(tmp_path / 'run.parquet', keys), 1e-9)  # whole numbers lose nothing
 
 
+@pytest.mark.parametrize(('up', 'per_second'), [
+    (3600, 1e9), (30, 1e9), (432000, 1e6), (20, 1e3)])  # since an hour, in nanoseconds, ...
+def test_stamps_since_a_machine_started_are_no_dates(
+    up: float, per_second: float, tmp_path: Path,
+) -> None:
+    pd.DataFrame(WHOLE[:, 1:]).assign(
+        stamp=np.rint((up + TIME) * per_second).astype(np.int64)).to_csv(
+        tmp_path / 'run.csv', index=False, columns=['stamp', *range(6)])
+    kinds = {one.kind: one.text for one in read(tmp_path / 'run.csv', ALL).findings}
+    assert 'epoch_unit' not in kinds
+    assert f'must be divided by {per_second:.0e}' in kinds['slow_rate']
+
+
 def test_velocities_have_a_scale_of_their_own(tmp_path: Path) -> None:
     table = np.column_stack([TIME, np.rad2deg(POSITION), VELOCITY, EFFORT])
     (tmp_path / 'run.csv').write_text(text(table))

@@ -14,6 +14,7 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
 
 pinocchio = pytest.importorskip('pinocchio')
 pytest.importorskip('mujoco')
@@ -189,6 +190,21 @@ def test_motors_have_the_effort_that_their_control_allows(tmp_path: Path) -> Non
     assert model.robot.structure.effort == pytest.approx([50, 20, np.inf])
     remarks = model.robot.structure.description.remarks
     assert any('servo' in each and 'controller' in each for each in remarks)
+
+
+@pytest.mark.parametrize(('flag', 'lost'), [
+    ('damper', {'damping'}), ('frictionloss', {'dry'}), ('spring', {'spring'}),
+    ('equality', {'mimic'}), ('constraint', {'dry', 'mimic'}), ('contact', set())])
+def test_what_a_flag_of_mjcf_disables_is_not_in_the_model(tmp_path: Path, flag: str,
+                                                          lost: set[str]) -> None:
+    (tmp_path / 'r.xml').write_text(
+        f'<mujoco><option><flag {flag}="disable"/></option>'
+        + THREE.replace('name="b"', 'name="b" damping="2" frictionloss="3" stiffness="4"')
+        + '<equality><joint joint1="c" joint2="a"/></equality></mujoco>')
+    joints = read_mjcf(str(tmp_path / 'r.xml')).joints
+    present = {name for name in ('damping', 'dry', 'spring') if getattr(joints['b'], name)}
+    present |= {'mimic'} if joints['c'].mimic else set()
+    assert present == {'damping', 'dry', 'spring', 'mimic'} - lost
 
 
 def test_masses_and_joints_suffice_where_mesh_files_are_missing(tmp_path: Path) -> None:

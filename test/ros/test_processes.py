@@ -18,9 +18,9 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.mechanism.motion_files import write_motion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
+from pprs_dynamics.simulation.motion_files import write_motion
 
 pytestmark = pytest.mark.nodes
 

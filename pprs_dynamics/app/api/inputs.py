@@ -313,9 +313,11 @@ def _require_efforts(recordings: Mapping[str, Recording]) -> None:
             raise UnreadableFileError(name, f'none of its {len(recording.time)} samples can be '
                                       'used, must have a longer part without a gap')
         if not np.isfinite(recording.effort).any():
-            raise UnreadableFileError(name, 'no effort of any drive is recorded, must be recorded '
-                                      'beside the positions (<drive>/effort in a CSV, effort in '
-                                      'JointState)')
+            cut_off = [finding.text for finding in recording.findings
+                       if finding.kind == 'mostly_saturated']
+            raise UnreadableFileError(name, '; '.join(cut_off) or (
+                'no effort of any drive is recorded, must be recorded beside the positions '
+                '(<drive>/effort in a CSV, effort in JointState)'))
 
 
 def _refuse_repeats(found: Mapping[str, Recording], earlier: Iterable[Recording], rule: str,

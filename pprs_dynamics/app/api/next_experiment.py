@@ -32,7 +32,7 @@ from pprs_dynamics.inference.experiments.next_experiment import Experiment, chec
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import write_motion
+from pprs_dynamics.simulation.motion_files import write_motion
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure

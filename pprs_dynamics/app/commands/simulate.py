@@ -17,11 +17,11 @@ from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file,
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.injection import NAMES, RANDOM
+from pprs_dynamics.simulation.motion_files import read_poses
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 

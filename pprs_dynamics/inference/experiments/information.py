@@ -209,6 +209,7 @@ class Information:
     @cached_property
     def _sensitivities(self) -> Sensitivities:
         found = Sensitivities(self.model, self.given)
+        found.is_planned = True
         found.restrict({column.effect for column in (*self.terms, *self.base) if isinstance(
             column, (FittedTerm, PresentCoefficient, PresentShape))}
             | {type(effect) for effect in self.given.effects

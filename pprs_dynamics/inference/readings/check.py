@@ -204,7 +204,8 @@ class Search:
         if not (explains and start.most_left < table.EXPLAINED):
             # A load explains efforts that are many times those of the masses.
             self.fits += [fit for reading in self._loaded(first)
-                          if (fit := self.fit(reading, 1.0)) is not None]
+                          if (fit := self.fit(reading, 1.0)) is not None
+                          and fit.most_left < table.GOOD_FIT]
         for reading in readings(drives, self.model.units, self.are_counts):
             is_order = reading.kind == 'drive_order'
             if not is_order and explains and start.most_left < table.EXPLAINED:
@@ -268,11 +269,16 @@ class Search:
         """Yield readings with zeros that are quarter turns off, one drive after another."""
         if seed.left < table.CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
             return
-        for _ in self.model.drives:
-            fits = [fit for d, units in enumerate(self.model.units) if units.turns
-                    for turn in table.QUARTERS
-                    if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
-                                        seed.time_unit, seed.score)) is not None]
+        drives = self.model.drives
+        turning = [d for d, units in enumerate(self.model.units) if units.turns]
+        for _ in drives:
+            turned = [quarter_turn(drives, d, turn, seed.reading)
+                      for d in turning for turn in table.QUARTERS]
+            if len(turning) <= table.MOST_TURNED:  # two may be off together
+                turned += [quarter_turn(drives, d, turn, one) for one in turned for d in turning
+                           for turn in table.QUARTERS if d > max(one.drives, default=len(drives))]
+            fits = [fit for reading in turned
+                    if (fit := self.fit(reading, seed.time_unit, seed.score)) is not None]
             best = max(fits, key=lambda fit: fit.score, default=seed)
             if best.score <= seed.score:
                 return
@@ -348,12 +354,12 @@ class Search:
         if has_weight and self.has_gain:
             fits += [fit_of(scales, price, what) for scales, price, what in self._by_drive(
                 factors, measured)]
-        found = max(fits, key=lambda fit: fit.score)
-        # Another direction of weight is credible only for efforts that show the weight.
-        concerned = [likelihood(d, float(found.scales[d])).prior for d in measured
-                     if d in reading.drives]
-        is_turned = reading.kind in ('position_offset', 'position_unit', 'mounting')
-        return None if is_turned and min(concerned, default=0.0) > table.PLAUSIBLE else found
+        if reading.kind in ('position_offset', 'position_unit', 'mounting'):
+            # Another direction of weight is credible only for efforts that show the weight.
+            fits = [fit for fit in fits if min([
+                likelihood(d, float(fit.scales[d])).prior for d in measured
+                if d in reading.drives], default=0.0) <= table.PLAUSIBLE]
+        return max(fits, key=lambda fit: fit.score, default=None)
 
     def _factors(self, evidence: Evidence, reading: Reading) -> Array:
         """Return the factor of weight and inertia in the efforts of each drive, (D,), or NaN."""
@@ -415,7 +421,7 @@ class Search:
             column = int(fit.reading.efforts[d])
             if evidence.is_measured(d, column):
                 some = Shares.of(evidence, d, column)
-                if abs(some.friction) > table.CERTAIN * some.friction_by_chance:
+                if some.has_friction:
                     votes += float(weights[d] * np.sign(some.friction))
         return votes <= 0
 
@@ -425,6 +431,11 @@ class Search:
         with np.errstate(invalid='ignore'):
             slack = table.STROKE_SLACK * (upper - lower)
         position = read_motion(excerpt.motion, reading).position
+        # Drives may report angles from 0 to a turn.
+        turns = np.array([units.turns for units in self.model.units]) & np.isfinite(upper - lower)
+        middle = np.mean(np.where(turns, (lower, upper), 0.0), axis=0)
+        position = np.where(turns, position - 2 * np.pi * np.round(
+            (position - middle) / (2 * np.pi)), position)
         slack = np.where(np.isfinite(slack), slack, 0.0)
         return not np.any((position < lower - slack) | (position > upper + slack))
 
@@ -478,7 +489,7 @@ def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[Other
                               scales=_position_scales(model, reading))
     if fit.what in table.SHARES.values():
         yield OtherReading.of(
-            'effort_unit', drives, range(len(drives)), f'the effort of '
+            'effort_share', drives, range(len(drives)), f'the effort of '
             f"{named(drives, tuple(range(len(drives))))} looks like {fit.what} of the drives' "
             'largest', scales=_effort_scales(model, range(len(drives)), fit.scales))
     elif not np.all(np.isin(fit.scales, table.SCALES)):
@@ -571,8 +582,6 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
             return (), 'joint_map: {' + ', '.join(
                 f'{scalar(drives[k])}: {scalar(joints[moved[0][1][k]])}'
                 for k in reading.drives) + '}'
-        if ', ' in recording.source:  # of a topic: its columns cannot be named
-            return (), ''
         known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
         names = {drive: {key: f'{joint}/{key}' for key in known}
                  for drive, joint in zip(drives, joints, strict=True)}
@@ -598,8 +607,10 @@ def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, A
         farthest = max(far, key=lambda k: reach[k] / ends[k])
         scale = plain(len(drives)).changed('position_unit', '', group, 0.0, scale=np.array(
             [unit if k in group else 1.0 for k in range(len(drives))]))
+        # Efforts that could not confirm it leave it a question.
         yield OtherReading.of(
-            'position_unit', drives, group, f'the positions of {named(drives, group)} reach '
+            'stroke' if turns and np.isfinite(recording.effort).any() else 'position_unit',
+            drives, group, f'the positions of {named(drives, group)} reach '
             f'{reach[farthest]:.4g} {model.units[farthest].position}, far out of the stroke'
             + (f', as if they were in {names[unit]}' if unit != 1.0 else ''),
             scales=() if unit == 1.0 else _position_scales(model, scale))

@@ -19,7 +19,7 @@ from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VE
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 
-TIME_WORDS = {'time', 'micros', 'millis', *TIME_LIKE, *table.TIME_WORDS}
+TIME_WORDS = {'time', *TIME_LIKE}
 
 
 class GuessError(PprsError, ValueError):
@@ -99,9 +99,11 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     """
     time, time_scale, notes = _time(series, rate is not None)
     left = [one for one in series if time is None or one.column != time.column]
+    # pandas numbers rows in a column without a title, as other programs do.
+    left = [one for one in left if one.title or not _rises(one.values)
+            or not _counts_rows(one.values)]
     if not left:
         raise GuessError('no column holds numbers beside times')
-    # pandas numbers rows in a column without a title.
     titled = [one for one in left if one.title]
     if titled:
         columns, found = _by_names(titled, joints, quantity, others)
@@ -130,15 +132,51 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
 
 
 def words_of(title: str) -> list[str]:
-    """Return the words and numbers that a name is made of, in lower case."""
-    parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', title.replace('_', ' '))  # not in mA
-    return [each for word in re.findall(r'[a-z]+|\d+', parts.lower()) for each in _split(word)]
+    """Return the words and numbers of a name, in lower case; a unit as its quantity, `<effort>`."""
+    plain, unit = _without_unit(title)
+    return plain if unit is None else [*plain, f'<{unit[0]}>']
+
+
+def unit_of(title: str) -> tuple[str, float] | None:
+    """Return the quantity that the unit in a name is of, and its factor to SI; None for none."""
+    return _without_unit(title)[1]
+
+
+def _without_unit(title: str) -> tuple[list[str], tuple[str, float] | None]:
+    """Return the words of a name without its unit, and the unit."""
+    for bracket in re.finditer(r'[\[(]([^\])]*)[\])]', title):
+        if unit := _unit(re.sub(r'[ ._*·^-]', '', bracket[1].lower())):
+            return _words(title[:bracket.start()] + ' ' + title[bracket.end():]), unit
+    words = _words(title)
+    for length in (2, 1):
+        for at in range(len(words) - length, -1, -1):
+            some = words[at:at + length]
+            # Single letters are units in brackets alone.
+            if (len(some[0]) > 1 or not some[0].isalpha()) and (
+                    unit := _unit('/'.join(some)) or _unit(''.join(some))):
+                return words[:at] + words[at + length:], unit
+    return words, None
+
+
+def _unit(name: str) -> tuple[str, float] | None:
+    return next(((quantity, units[name]) for quantity, units in table.UNITS.items()
+                 if name in units), None)
+
+
+def _words(text: str) -> list[str]:
+    parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', text.replace('_', ' '))  # not in mA
+    found = re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower())
+    return [each for word in found for each in _split(word)]
 
 
 def _split(word: str) -> list[str]:
     """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
     known = {each for words in table.WORDS.values() for each in words}
-    if word[:-1] in known and len(word) > 3 and word not in known and word[-1] in table.LETTERS:
+    for prefix in ('ist', 'soll'):  # Istposition
+        if word.startswith(prefix) and word.removeprefix(prefix) in known:
+            return [prefix, word.removeprefix(prefix)]
+    if word[:-1] in known and (len(word) > 3 or word[0] in 'qd') and word not in (
+            known | table.OTHERS) and word[-1] in table.LETTERS:
         return [word[:-1], table.LETTERS[word[-1]]]
     return [word]
 
@@ -159,7 +197,7 @@ def _time(series: Sequence[Series], has_rate: bool,
     """Return the column of times, its unit [s] where it is not seconds, and comments."""
     rising = [each for each in series if _rises(each.values)]
     named = [each for each in rising if each.title in TIME_COLUMNS] or [
-        each for each in rising if {*words_of(each.title)} & TIME_WORDS]
+        each for each in rising if _is_time(words_of(each.title))]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
@@ -169,15 +207,20 @@ def _time(series: Sequence[Series], has_rate: bool,
             and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
         if not even:
             return None, None, notes
-        found = even[0]
+        # A counter of rows may come first.
+        found = even[len(even) > 1 and _counts_rows(even[0].values)]
         notes.append(f'column {found.column} rises all the time: taken as time')
-    scale = next((table.TIME_WORDS[word] for word in words_of(found.title)
-                  if word in table.TIME_WORDS), None)
+    scale = _scale(found.title, table.TIME)
     step = float(np.median(np.diff(found.values[np.isfinite(found.values)])))
     if scale is None and step > table.SLOWEST:
         scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
     return replace(found, values=found.values * (scale or 1.0)), scale, notes
+
+
+def _is_time(words: Sequence[str]) -> bool:
+    units = {word for word in words if word.startswith('<')}
+    return f'<{table.TIME}>' in units or bool(not units and {*words} & TIME_WORDS)
 
 
 def _rises(values: Array) -> bool:
@@ -223,17 +266,23 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         for one in series:
             groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
     columns: dict[tuple[str, str], Column] = {}
-    wanted = (quantity,) if quantity else (POSITION, VELOCITY, EFFORT, CURRENT)
+    currents_are_measured = False
+    wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
     for each in wanted:
         best = max(groups, key=lambda key: _fit(key, groups[key], each, quantity), default=None)
         if best is None or _fit(best, groups[best], each, quantity)[0] <= 0:
             continue
-        if each == CURRENT and any(kind == EFFORT for _, kind in columns):
+        # Efforts come before currents, but what was measured before all else.
+        is_measured = not {*best} & (table.COMMANDS | table.FROM_OUTSIDE)
+        if each == EFFORT and not is_measured and currents_are_measured:
             continue
+        currents_are_measured = each == CURRENT and is_measured
         best = _last_of(best, [key for key in groups if _fit(key, groups[key], each, quantity)
                                == _fit(best, groups[best], each, quantity)], groups, series)
         if {*best} & table.COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
+        if each == EFFORT:
+            columns = {key: column for key, column in columns.items() if key[1] != CURRENT}
         columns.update({(joint, each): column for joint, column in groups[best].items()})
     for channel, telling in table.CHANNEL_WORDS.items() if quantity is None else ():
         told = [key for key in groups if {*key} & telling and not {*key} & table.COMMANDS]
@@ -251,27 +300,33 @@ def _last_of(best: tuple[str, ...], rivals: Sequence[tuple[str, ...]],
 
     joint = max(groups[best], key=lambda joint: np.nanstd(values[groups[best][joint]]))
     return max((key for key in rivals if joint in groups[key]), key=lambda key: _lag(
-        values[groups[best][joint]], values[groups[key][joint]])) if len(rivals) > 1 else best
+        values[groups[best][joint]], values[groups[key][joint]]) or 0) if len(rivals) > 1 else best
 
 
-def _lag(values: Array, other: Array) -> int:
-    """Return by how many samples other values come later; 0 where they do not move alike."""
+def _lag(values: Array, other: Array) -> int | None:
+    """Return by how many samples other values come later; None where they do not move alike."""
     first, second = np.diff(np.nan_to_num(values)), np.diff(np.nan_to_num(other))
     count = len(first) - table.LONGEST_LAG
     if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
-        return 0
+        return None
     found = {sign * k: float(np.corrcoef(early[:count], late[k:count + k])[0, 1])
              for sign, early, late in ((-1, second, first), (1, first, second))
              for k in range(table.LONGEST_LAG)}
     best = max(found, key=lambda lag: found[lag])
-    return best if found[best] > table.COPY else 0
+    return best if found[best] > table.COPY else None
 
 
 def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
          ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
-    told = {kind for kind, words in table.WORDS.items() if {*key} & {*words}}
-    if not told and {*key} & table.OF_JOINTS:
+    told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
+    for words in ({word for word in key if len(word) > 1}, {*key}):
+        # A single letter beside a word is a prefix of programmers.
+        told = told or {kind for kind, known in table.WORDS.items() if words & {*known}}
+    is_german = bool({*key} & {'ist', 'soll'})
+    if not told and is_german and 'm' in key:
+        told.add(EFFORT)
+    if not told and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
         told.add(POSITION)  # "joint torque" is no position
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
@@ -394,8 +449,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
     if unlike:
         raise AmbiguousColumns(joints, [{**kinds, EFFORT: group}
                                         for group in (efforts[0], unlike)], series)
-    if efforts:  # of what is the same but for its scale, as measured and asked efforts, the first
-        kinds = {**kinds, EFFORT: efforts[0]}
+    if efforts:
+        kinds = {**kinds, EFFORT: _measured(values, efforts)}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in kinds.items()]
     unused = [place for place in range(len(series))
@@ -445,15 +500,20 @@ def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
             group.append(i)
     pairs = []
     for group in groups:
-        i, j = max(((i, j) for i in group for j in np.flatnonzero(derived[i]).tolist()),
-                   key=lambda pair: round(float(links.correlation[pair]), 5))
-        pairs.append((i, j))
+        i = _measured(values, [[k] for k in group])[0]
+        speeds = np.flatnonzero(derived[i])
+        most = speeds[np.argmax(links.correlation[i, speeds])]
+        pairs.append((i, _measured(values, [[k] for k in speeds.tolist() if same[most, k]
+                                            or k == most])[0]))
     pairs.sort()
     # Velocities of one robot are in one unit.
     slopes = [float(np.log(links.slope[pair])) for pair in pairs]
     if (len(pairs) == count == len({j for _, j in pairs})
             and np.ptp(slopes) <= table.SAME_UNIT):
+        # Of what was asked for the derivatives are known, too.
         used = [place for pair in pairs for place in pair]
+        used += [place for place in range(values.shape[1]) if place not in used and any(
+            _lag(values[:, each], values[:, place]) is not None for each in used)]
         rest = [place for place in range(values.shape[1])
                 if place not in used and not _is_known(links, place, used)]
         yield {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}, [
@@ -477,6 +537,16 @@ def _layouts(values: Array, time: Array, count: int) -> Iterator[Candidate]:
                 speeds = [other for other, yes in zip(layout, is_rate, strict=True) if yes]
                 yield {POSITION: block, **({VELOCITY: speeds[0]} if speeds else {})}, [
                     other for other in layout if other is not block and other not in speeds]
+
+
+def _measured(values: Array, blocks: Sequence[list[int]]) -> list[int]:
+    """Return of blocks that move alike the last one, or the one with noise: commands have none."""
+    first = values[:, blocks[0]]
+    lags = [float(np.median([_lag(one, other) or 0 for one, other in zip(
+        first.T, values[:, block].T, strict=True)])) for block in blocks]
+    rough = [_roughness(values[:, block]) for block in blocks]
+    return max(zip(lags, rough, blocks, strict=True), key=lambda each: (
+        each[0], each[1] > table.ROUGHER * min(rough)))[2]
 
 
 def _roughness(values: Array) -> float:
@@ -546,8 +616,9 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
 
 
 def _scale(title: str, quantity: str) -> float | None:
-    known = table.UNIT_WORDS.get(quantity, {})
-    return next((known[word] for word in words_of(title) if word in known), None)
+    unit = unit_of(title)
+    return unit[1] if unit and unit[1] != 1 and (
+        unit[0] == quantity or (unit[0] == table.SHARE and quantity == EFFORT)) else None
 
 
 def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None) -> Guess:

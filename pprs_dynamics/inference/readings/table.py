@@ -40,7 +40,7 @@ OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
-SHARES = {0.01: 'percent', 1e-3: 'per mille'}
+SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 EITHER = 'kgf cm or amperes'
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
 # Directions of gravity in the base of a robot on a wall or under a ceiling.
@@ -108,14 +108,14 @@ BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
 # Words of a title, and the quantity that they tell.
 WORDS = {
-    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'qpos', 'enc',
-               'encoder', 'ticks', 'winkel', 'lage'),
-    VELOCITY: ('velocity', 'velocities', 'vel', 'dq', 'qd', 'qdot', 'dtheta', 'speed', 'omega',
-               'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
-    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'force', 'moment', 'load',
-             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
+    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
+               'enc', 'encoder', 'ticks', 'winkel', 'lage'),
+    VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
+               'omega', 'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
+    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'torq', 'force', 'moment',
+             'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
-              'ma', 'strom'),
+              'strom'),
 }
 # These tell of a position where nothing else is told.
 OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
@@ -134,25 +134,40 @@ COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
-FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
+FROM_OUTSIDE = frozenset(('ext', 'external', 'contact', 'dist', 'disturbance'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
     'link'))
-UNIT_WORDS = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math.pi / 180,
-                         'degrees': math.pi / 180, 'grad': math.pi / 180, 'rev': 2 * math.pi,
-                         'mm': 1e-3, 'mrad': 1e-3},
-              VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
-                         'mm': 1e-3, 'mms': 1e-3},
-              EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
-              CURRENT: {'ma': 1e-3}}
-TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'us': 1e-6,
-              'usec': 1e-6, 'micros': 1e-6, 'ns': 1e-9, 'nsec': 1e-9, 'nanoseconds': 1e-9}
+TIME, SHARE, NEITHER = 'time', 'share', 'neither'
+# Units in titles, in lower case and without signs between their letters, and their factors to SI.
+UNITS = {
+    POSITION: {'rad': 1.0, 'mrad': 1e-3, 'm': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'um': 1e-6, 'µm': 1e-6,
+               **dict.fromkeys(('deg', '°', 'grad', 'degree', 'degrees'), math.pi / 180),
+               **dict.fromkeys(('rev', 'revs', 'turn', 'turns'), 2 * math.pi),
+               **dict.fromkeys(('radian', 'radians'), 1.0)},
+    VELOCITY: {'rad/s': 1.0, 'm/s': 1.0, 'mm/s': 1e-3, 'cm/s': 1e-2,
+               **dict.fromkeys(('rpm', '1/min', 'u/min', 'rev/min'), math.pi / 30),
+               **dict.fromkeys(('deg/s', '°/s', 'grad/s', 'degs', 'dps'), math.pi / 180),
+               **dict.fromkeys(('rev/s', 'turn/s', 'turns/s'), 2 * math.pi), 'mms': 1e-3},
+    EFFORT: {'n': 1.0, 'nm': 1.0, 'mn': 1e-3, 'mnm': 1e-3, 'nmm': 1e-3, 'ncm': 1e-2, 'kn': 1e3,
+             'knm': 1e3, 'kgf': 9.80665, 'kgfm': 9.80665, **dict.fromkeys(('lbfin', 'inlb'),
+             0.1129848), **dict.fromkeys(('kgfcm', 'kgcm'), 0.0980665),
+             **dict.fromkeys(('lbfft', 'ftlb'), 1.3558179), 'ozin': 7.0615518e-3},
+    CURRENT: {'a': 1.0, 'ma': 1e-3},
+    SHARE: {'%': 0.01, '‰': 1e-3},
+    TIME: {**dict.fromkeys(('s', 'sec'), 1.0),
+           **dict.fromkeys(('ms', 'msec', 'millis', 'milliseconds'), 1e-3),
+           **dict.fromkeys(('us', 'µs', 'usec', 'micros', 'microseconds'), 1e-6),
+           **dict.fromkeys(('ns', 'nsec', 'nanosec', 'nanoseconds'), 1e-9)},
+    NEITHER: dict.fromkeys(('v', 'w', '°c', 'c', 'degc', 'k', 'bar', 'hz', 'j', 'm/s2', 'rad/s2',
+                            'deg/s2', 'mm/s2', '°/s2'), 1.0)}
 
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
 AS_WELL = 0.003  # difference of correlations that says nothing
+ROUGHER = 1.5  # third differences of what has noise, over those of what has none
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
@@ -170,6 +185,7 @@ NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
 RATE_OFF = 0.03  # relative error of a sampling rate that is reported
 
 MOST_PERMUTED = 4  # drives of which all orders are tried
+MOST_TURNED = 3  # drives of which two zeros at a time are tried
 
 
 @dataclass(frozen=True)

@@ -120,6 +120,9 @@ class Sensitivities:
         Effects outside the drives that the given model could have and has not.
     of_zeros : bool
         Whether `HOMING` is computed.
+    is_planned : bool
+        Whether the motion is only planned. Columns of added bodies are then those of rigid bodies:
+        all of them take one evaluation.
     """
 
     def __init__(self, model: DriveModel, given: DriveModel) -> None:
@@ -132,6 +135,8 @@ class Sensitivities:
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
         self.of_zeros = any(effect.shifts_positions() and given.offers(effect)
                             for effect in catalogue().values())
+        self.is_planned = False
+        self._inertial: dict[type[AddedBody], Array] = {}
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
@@ -310,6 +315,9 @@ class Sensitivities:
         present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
+            if self.is_planned and self.model.robot.structure is not None:
+                rigid = self._of_rigid_bodies(effect, state)
+                return rigid, rigid
         values = {} if present is None else effect.to_coefficients(present.values)
         full, bare = [], []
         for c in effect.coefficients:
@@ -320,6 +328,16 @@ class Sensitivities:
             full.append((self._efforts(self.model, found) - before) / c.scale)
             bare.append((found.rigid_force - state.rigid_force) / c.scale)
         return full, bare
+
+    def _of_rigid_bodies(self, effect: type[AddedBody], state: Any) -> list[Array]:
+        """Return columns of added bodies without the friction that they cause."""
+        robot = self.model.robot
+        if effect not in self._inertial:
+            self._inertial[effect] = np.stack([
+                (effect.at({c.name: c.scale}).changed(robot).inertial - robot.inertial).ravel()
+                / c.scale for c in effect.coefficients])
+        links = robot.regressor(state.position, state.velocity, state.acceleration)
+        return [*np.tensordot(self._inertial[effect], links, (1, 2))]
 
 
 @dataclass(frozen=True)

@@ -298,12 +298,24 @@ def _json(path: Path) -> dict[str, Any]:
     return table
 
 
+def _cells(row: Mapping[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield the numbers of an object by `name.name`, of objects in a list by `name[0].name`."""
+    for name, value in row.items():
+        if isinstance(value, Mapping):
+            yield from _cells(value, f'{before}{name}.')
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for k, each in enumerate(value):
+                yield from _cells(each, f'{before}{name}[{each.get("name", k)}].')
+        else:
+            yield f'{before}{name}', value
+
+
 def _largest_table(content: Any, depth: int) -> dict[str, Any]:
-    """Return lists of one length by name; of objects in a list, their numbers by `name.name`."""
+    """Return lists of one length by name; of objects in a list, their numbers."""
     import pandas as pd
 
     if isinstance(content, list) and content and isinstance(content[0], Mapping):
-        frame = pd.json_normalize([row for row in content if isinstance(row, Mapping)])
+        frame = pd.DataFrame([dict(_cells(row)) for row in content if isinstance(row, Mapping)])
         content = {str(name): frame[name].tolist() for name in frame}
     elif not isinstance(content, Mapping) or not depth:
         return {}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.drives import DriveColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
 from pprs_dynamics.measurement.files.joint_state_cdr import (
@@ -30,7 +30,14 @@ from pprs_dynamics.measurement.files.merged_states import (
     read_channels,
     read_merged,
 )
-from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, Samples, whole_epoch
+from pprs_dynamics.measurement.files.samples import (
+    QUANTITIES,
+    Defect,
+    Indices,
+    Progress,
+    Samples,
+    whole_epoch,
+)
 from pprs_dynamics.measurement.files.way_out import MOST, missing_names
 from pprs_dynamics.system.files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
@@ -61,7 +68,7 @@ def read_bag(
     """
     drives = recorded.joints or recorded.names
     with opened_bag(path) as (bag, findings):
-        samples = _read(bag, recorded, drives, topic, progress, findings)
+        samples = _by_columns(_read(bag, recorded, drives, topic, progress, findings), recorded)
         stamps = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
         return replace(samples, channels={**read_channels(bag, drives, stamps),
                                           **samples.channels})
@@ -112,6 +119,20 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
     return Samples(drives, (stamps - epoch * 10**9) / 1e9, position,
                    None if np.all(np.isnan(velocity)) else velocity, effort, epoch, f'bag, {name}',
                    tuple(findings))
+
+
+def _by_columns(samples: Samples, recorded: RecordedDrives) -> Samples:
+    """Return samples in which `columns` of the form <joint>/<quantity> name another joint's."""
+    columns = {} if recorded.columns is None else recorded.columns.drives
+    arrays = {name: values for name in QUANTITIES
+              if (values := getattr(samples, name)) is not None}
+    changed = {name: values.copy() for name, values in arrays.items()}
+    for d, drive in enumerate(recorded.names):
+        for quantity, column in columns.get(drive, DriveColumns()).names.items():
+            joint, _, named = str(column).rpartition('/')
+            if joint in samples.drives and named == quantity and named in arrays:
+                changed[named][:, d] = arrays[named][:, samples.drives.index(joint)]
+    return replace(samples, **changed)
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],

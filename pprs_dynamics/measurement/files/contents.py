@@ -66,9 +66,9 @@ def look_into(path: Path) -> Contents:
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     table = open_table(path)
-    if isinstance(table, CsvTable) and not table.is_numeric:
+    if isinstance(table, CsvTable) and table.numbers < len(table.sample):
         with_commas = CsvTable.open(path, ',')
-        table = with_commas if with_commas.is_numeric else table
+        table = with_commas if with_commas.numbers > table.numbers else table
     return Contents(series=tuple(table.series(ROWS)), decimal=table.decimal)
 
 

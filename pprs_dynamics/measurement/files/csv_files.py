@@ -42,7 +42,7 @@ REMARKS = ('#', '%', 'sep=')  # lines that may stand above a table
 ZSTANDARD = ('.zst', '.zstd')
 LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
-NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
+NO_NUMBERS = ['', 'nan', 'NaN', 'NAN', 'N/A', 'NA', 'null', 'NULL', 'None']
 PREAMBLE = 20  # lines that may stand above a table
 NO_TEXT = ('not a recording, must be a bag (rosbag2, .mcap, .db3, ROS 1) or a table (.csv, '
            '.parquet, .mat, .npz, .json)')
@@ -95,7 +95,7 @@ class CsvTable:
         UnreadableFileError
             Where it is no text, or empty.
         """
-        with _text_of(path) as (file, _):
+        with text_of(path) as (file, _):
             lines = list(islice(file, PREAMBLE))
         if not lines:
             raise UnreadableFileError(path, 'the file is empty')
@@ -116,15 +116,20 @@ class CsvTable:
         while remarks < len(lines) - 1 and lines[remarks].startswith(REMARKS):
             remarks += 1
         # A header as numpy.savetxt writes it is a remark.
-        rows = [_cells(path, number, line.lstrip('#% ') if number == remarks else line, separator)
+        rows = [cells_of(path, number, line.lstrip('#% ') if number == remarks else line, separator)
                 if line.strip() and number >= remarks else []
                 for number, line in enumerate(lines, 1)]
 
+        def words(k: int) -> list[int]:
+            """Return the places of a row's words, as names and states of a log are."""
+            return [at for at, cell in enumerate(rows[k]) if not _is_value(cell, decimal)]
+
         def is_row(k: int) -> bool:
-            return any(rows[k]) and all(_is_value(cell, decimal) for cell in rows[k])
+            return any(rows[k]) and 2 * len(words(k)) < len(rows[k])
 
         first = next((k for k in range(remarks, len(rows) - 1) if is_row(k) and is_row(k + 1)
-                      and 1 < len(rows[k]) == len(rows[k + 1])), remarks)
+                      and 1 < len(rows[k]) == len(rows[k + 1]) and words(k) == words(k + 1)),
+                     remarks)
         if first == remarks and not is_row(remarks):
             first += 1
         sample = rows[first] if first < len(rows) else []
@@ -136,9 +141,9 @@ class CsvTable:
         return cls(path, separator, decimal, names, count, first, sample, heads)
 
     @property
-    def is_numeric(self) -> bool:
-        """Whether the first row holds numbers and dates."""
-        return any(self.sample) and all(_is_value(cell, self.decimal) for cell in self.sample)
+    def numbers(self) -> int:
+        """How many cells of the first row hold numbers or dates."""
+        return sum(bool(cell) and _is_value(cell, self.decimal) for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.
@@ -157,7 +162,7 @@ class CsvTable:
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
         blocks, unpacked, row = [], 0, self.above + 1
-        with _text_of(self.path) as (file, raw):
+        with text_of(self.path) as (file, raw):
             for _ in range(self.above):
                 file.readline()
             while lines := file.readlines(BLOCK):
@@ -174,11 +179,11 @@ class CsvTable:
     def series(self, most: int) -> Iterator[Series]:
         """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
         found: list[list[float]] = []
-        with _text_of(self.path) as (file, _):
+        with text_of(self.path) as (file, _):
             for _ in range(self.above):
                 file.readline()
             for line in islice(file, most):
-                cells = _cells(self.path, 0, line, self.separator) if line.strip() else []
+                cells = cells_of(self.path, 0, line, self.separator) if line.strip() else []
                 if len(cells) == self.count:
                     found.append([self._any(cell) for cell in cells])
         if not found:
@@ -186,7 +191,7 @@ class CsvTable:
         for k, values in enumerate(np.array(found).T):
             if np.isfinite(values).any():
                 name = self.names[k] if self.names else ''
-                yield Series(name or k + 1, name, values)
+                yield Series(name if self.names.count(name) == 1 and name else k + 1, name, values)
 
     def _any(self, cell: str) -> float:
         try:
@@ -239,7 +244,7 @@ class CsvTable:
 
     def _row(self, number: int, line: str) -> list[str]:
         """Return the cells of a row, or raise UnreadableFileError if it is none of this table."""
-        cells = _cells(self.path, number, line, self.separator)
+        cells = cells_of(self.path, number, line, self.separator)
         if len(cells) == self.count:
             return cells
         raise UnreadableFileError(
@@ -260,7 +265,7 @@ class CsvTable:
                 f'holds {cell[:40]!r}{comma}') from None
 
 
-def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:
     """Return the cells of a row, which ends where its line does."""
     line = BLANK.join(line.split()) if separator == BLANK else line.rstrip('\n')
     try:
@@ -303,7 +308,7 @@ def _seconds_of(date: str) -> float:
 
 
 @contextmanager
-def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
+def text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
     """Open a file as text, and its bytes, of which `tell` is how far it was read."""
     damages = (EOFError, zlib.error, *([zstd().ZstdError] if path.suffix in ZSTANDARD else []))
     try:

@@ -30,6 +30,9 @@ SHORTEST_SEGMENT = 20
 # Below these a recording is told to be short: too few samples for statistics of a model's error.
 FEW_SAMPLES = 100
 SHORT_TIME = 1.0
+# Share of a drive's efforts at a limit, from which on the others are not used either: they are
+# chosen by their size, so that no fit to them is one of the drive.
+MOSTLY_SATURATED = 0.9
 # Median steps beyond this [s] cannot follow a robot.
 SLOW_STEP = 0.1
 # From this step [s] on stamps are rather of a smaller unit, in which the step is short enough.
@@ -253,11 +256,13 @@ class Judgement:
             levels = sorted({f'{value:.4g}' for value in size[at_limit]}, key=float)
             level = f'its limit of {limit:.6g}' if largest >= AT_LIMIT * limit else (
                 ' and '.join(levels))
-            self._tell('saturated_effort', int(at_limit.sum()),
+            share = at_limit.sum() / np.isfinite(effort[:, drive]).sum()
+            is_lost = share > MOSTLY_SATURATED
+            self._tell('mostly_saturated' if is_lost else 'saturated_effort', int(at_limit.sum()),
                        f'the effort of {name} is cut off at {level} '
-                       f'{samples.unit_of(drive, "N")} in {100 * at_limit.mean():.3g} % of the '
-                       'samples', stamps.runs(at_limit), [name])
-            effort[at_limit, drive] = np.nan
+                       f'{samples.unit_of(drive, "N")} in {100 * share:.3g} % of the samples',
+                       stamps.runs(at_limit), [name])
+            effort[at_limit | is_lost, drive] = np.nan
 
     def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:
         missing = np.isnan(values)

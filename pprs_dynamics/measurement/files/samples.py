@@ -62,6 +62,7 @@ POLICY = {
     'held_effort': 'each is used once',
     'effort_zero': 'they count as not measured',
     'saturated_effort': 'they are left out of every comparison and fit',
+    'mostly_saturated': 'too few efforts remain to judge this drive, and none of it is used',
     'no_effort': 'compare, diagnose, fit and adopt need them and will refuse it',
     'effort_not_measured': 'the motion is kept and these efforts count as not measured',
     'missing_velocity': 'they are computed from the positions',

@@ -39,8 +39,10 @@ TIME_COLUMNS = ('time', '__time')
 # What other programs call it.
 TIME_LIKE = ('t', 'ts', 'stamp', 'stamps', 'timestamp', 'timestamps', 'times', 'seconds', 'sec',
              'clock', 'rostime', 'date', 'datum', 'datetime', 'zeit', 'uhrzeit')
-# From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
-LATEST_SECOND = 1e11
+# Stamps that count thousandths, millionths, ... of seconds since 1970 are of 2000 to 2100, and
+# nearer to each other than this [s]: others count from the start of a machine.
+DATES = 9.4e8, 4.2e9
+LONGEST_STEP = 60.0
 PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
 Table = CsvTable | ArrayTable
 
@@ -164,20 +166,18 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     # What is measured once for all drives.
     shared = {(joint, name): columns.channels.get(name, name) for name in CHANNELS
               if name in columns.channels or name in table.names for joint in joints}
-    ours = tuple(joint for joint in joints if (joint, 'position') not in named)
-    if not ours:
-        return {**shared, **named}, ''
-    found: dict[str, dict[tuple[str, str], Column]] = {}
+    found: dict[str, dict[tuple[str, str], Column]] = {'': {}}
     for name in table.names:
         joint, slash, quantity = name.rpartition('/')
         prefix, _, drive = joint.rpartition('/')
         if slash and quantity in (*QUANTITIES, CURRENT, *CHANNELS):
             found.setdefault(prefix, {})[drive, quantity] = name
-    prefix = _prefix(table.path, found, ours, topic)
-    chosen = {key: name for key, name in found[prefix].items() if key[0] in ours}
-    for joint in ours:
-        if (joint, 'effort') in chosen:
-            chosen.pop((joint, CURRENT), None)
+    ours = tuple(joint for joint in joints if (joint, 'position') not in named)
+    prefix = _prefix(table.path, found, ours, topic) if ours else ''
+    # A named current replaces an effort of our own format, and the other way round.
+    chosen = {(joint, quantity): name for (joint, quantity), name in found[prefix].items()
+              if joint in joints and not (quantity == 'effort' and (joint, CURRENT) in named)
+              and not (quantity == CURRENT and (joint, 'effort') in {**found[prefix], **named})}
     return {**shared, **chosen, **named}, prefix
 
 
@@ -210,11 +210,11 @@ def _seconds(stamps: Any, columns: RecordedColumns, count: int,
     scale = columns.time_scale
     told: tuple[Defect, ...] = ()
     if scale is None:
-        finite = stamps[np.isfinite(stamps)]
-        largest = float(np.median(finite)) if len(finite) else 0.0
-        power = 0
-        while largest > LATEST_SECOND and power < max(PARTS):
-            largest, power = largest / 1e3, power + 3
+        finite = stamps[np.isfinite(stamps)].astype(float)
+        middle, step = (float(np.median(values)) if len(values) else 0.0
+                        for values in (finite, np.abs(np.diff(finite))))
+        power = next((power for power in PARTS if step <= LONGEST_STEP * 10.0 ** power
+                      and DATES[0] < middle / 10.0 ** power < DATES[1]), 0)
         scale = 10.0 ** -power
         if power:
             told = (Defect('epoch_unit', len(stamps),

@@ -132,10 +132,15 @@ class _Reader:
         for b in range(1, self.model.nbody):
             self._body(b, links, joints)
         loops = self._constraints(joints)
-        off = self.model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-        x, y, z = np.zeros(3) if off else self.model.opt.gravity
+        x, y, z = np.zeros(3) if self._is_off('GRAVITY') else self.model.opt.gravity
         return Description(self.path, links, joints, digest, tuple(loops),
                            (float(x), float(y), float(z)), tuple(self._remarks()))
+
+    def _is_off(self, *names: str) -> bool:
+        """Return whether a flag of <option> disables something."""
+        kinds = self.mujoco.mjtDisableBit
+        return any(self.model.opt.disableflags & int(getattr(kinds, f'mjDSBL_{name}', 0))
+                   for name in names)
 
     def _require_known_forces(self) -> None:
         """Raise ModelError for forces that a mechanism here cannot represent."""
@@ -215,9 +220,13 @@ class _Reader:
                                  'stiffness are constants here')
         stiffness = float(model.jnt_stiffness[k])
         relaxed = float(model.qpos_spring[model.jnt_qposadr[k]])
-        return {'armature': float(model.dof_armature[d]), 'damping': float(model.dof_damping[d]),
-                'dry': float(model.dof_frictionloss[d]),
-                'spring': (stiffness, relaxed) if stiffness else None}
+        return {'armature': float(model.dof_armature[d]),
+                'damping': 0.0 if self._is_off('DAMPER', 'PASSIVE') else float(
+                    model.dof_damping[d]),
+                'dry': 0.0 if self._is_off('FRICTIONLOSS', 'CONSTRAINT') else float(
+                    model.dof_frictionloss[d]),
+                'spring': (stiffness, relaxed) if stiffness and not self._is_off(
+                    'SPRING', 'PASSIVE') else None}
 
     def _require_bare(self, k: int) -> None:
         """Raise ModelError for a ball or free joint with forces of its own."""
@@ -259,7 +268,7 @@ class _Reader:
     def _constraints(self, joints: dict[str, Joint]) -> list[Loop]:
         model, kinds = self.model, self.mujoco.mjtEq
         loops: list[Loop] = []
-        if model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_EQUALITY):
+        if self._is_off('EQUALITY', 'CONSTRAINT'):
             return loops
         set_by: dict[int, str] = {}
         for e in range(model.neq):

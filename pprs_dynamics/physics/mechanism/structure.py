@@ -239,10 +239,7 @@ class Closing:
 
 
 def _rank(J: Array) -> int:
-    if not J.size:
-        return 0
-    values = np.linalg.svd(J, compute_uv=False)
-    return int(np.sum(values > RANK * values[0])) if values[0] > 0 else 0
+    return int(np.linalg.matrix_rank(J, tol=RANK * np.linalg.norm(J, 2))) if J.size else 0
 
 
 def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, units: Array,
@@ -476,14 +473,10 @@ class _Builder:
 
     def _leader(self, joint: Joint) -> tuple[Joint, float, float]:
         """Return the joint that one follows in the end, itself by default; ratio and offset."""
-        ratio, offset, seen = 1.0, 0.0, {joint.name}
-        leader = joint
+        ratio, offset, leader = 1.0, 0.0, joint
         while leader.mimic is not None:
             offset, ratio = offset + ratio * leader.mimic.offset, ratio * leader.mimic.ratio
             leader = self.description.joints[leader.mimic.joint]
-            if leader.name in seen:
-                raise ModelError('robot.urdf', joint.name, 'mimic no joint that mimics it')
-            seen.add(leader.name)
         return leader, ratio, offset
 
     def _is_locked(self, joint: Joint) -> bool:

@@ -892,7 +892,7 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
     for c in range(len(m.q)):
         of_tree[c] = 0.0
     for k in range(len(s.joint)):
-        j = s.joint[k]
+        j = int(s.joint[k])
         if j >= 0:
             c = t.joints[j, COORDINATE]
             rate = t.ratio[j] * m.v[c]
@@ -900,7 +900,7 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
             dry = s.torque[k] + s.lever[k] * length(across)
             of_tree[c] += t.ratio[j] * (s.viscous[k] * rate + dry * tanh(rate / s.width[k]))
         else:
-            g = s.loop[k]
+            g = int(s.loop[k])
             relative = minus(vector(links, t.closures[g, LOOP_B], W),
                              vector(links, t.closures[g, LOOP_A], W))
             speed = larger(length(relative), 1e-8 * s.width[k])

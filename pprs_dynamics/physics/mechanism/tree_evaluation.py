@@ -80,15 +80,15 @@ class InverseDynamicsResult(NamedTuple):
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
               given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              resistance: Any, actuators: Any, closed: Any, efforts: Any, stages: int,
+              actuators: Any, closed: Any, efforts: Any, stages: int,
               nearby: bool) -> int:
     """Evaluate the stages at each sample in turn; see `Evaluation`.
 
     Return the first sample that fails, or -1.
     """
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                      resistance[2], resistance[3]))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
     for s in range(len(closed)):
         at = s if stages & KEPT else 0
         m = elements(read_motion(sizes, motions[at], reals))
@@ -133,11 +133,11 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
 
 
 def _rub(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
-         rubbing: Any, resistance: Any, of_tree: Any, efforts: Any) -> None:
+         rubbing: Any, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                      resistance[2], resistance[3]))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
     for s in range(len(efforts)):
         m = elements(read_motion(sizes, motions[s], reals))
         o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
@@ -159,7 +159,7 @@ class Evaluation:
         self.sizes = self.packed.sizes
         self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
-        self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
+        self._friction = NO_FRICTION, np.array(NO_FRICTION)
         drives = len(t.drives)
         self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
         self._no_actuators = np.zeros((OF_DRIVE, drives))
@@ -235,8 +235,8 @@ class Evaluation:
         """
         found = np.zeros((len(rows), len(self.tables.drives)))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction[:2]),
-            np.array(friction[2:]), np.empty(len(self.home)), found)
+        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction),
+            np.empty(len(self.home)), found)
         return found
 
     def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
@@ -286,14 +286,14 @@ class Evaluation:
             loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
         if friction is not last[0]:
-            last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
+            last = self._friction = friction, np.array(friction)
         warm = nearby is not None
         at_home = self.at_home if warm or not stages & KEPT else NOWHERE
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
         return int(run(
             _evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
-            gravity, loads, last[1], last[2], actuators, closed, efforts, stages, warm))
+            gravity, loads, last[1], actuators, closed, efforts, stages, warm))
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:

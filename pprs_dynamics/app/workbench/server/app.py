@@ -42,7 +42,7 @@ from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.mechanism.motion_files import write_motion
+from pprs_dynamics.simulation.motion_files import write_motion
 from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'

@@ -13,14 +13,16 @@ Joints: `time` and `<joint>/position`, `<joint>/velocity`, `<joint>/acceleration
 from __future__ import annotations
 
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 
 from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.measurement.files.csv_files import CsvTable, cells_of, text_of
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.system.csv_tables import read_rows, write_table
-from pprs_dynamics.system.numbers import parse_number
+from pprs_dynamics.system.csv_tables import write_table
+from pprs_dynamics.system.files import require_file
 
 POSE_COLUMNS = ('time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'aly', 'alz')
@@ -28,7 +30,7 @@ QUANTITIES = ('position', 'velocity', 'acceleration')  # of a joint
 
 
 def read_poses(path: str | PathLike[str], rate: float | None = None) -> PlatformMotion:
-    """Read a CSV of poses, columns in any order.
+    """Return the motion in a CSV of poses, columns in any order.
 
     Parameters
     ----------
@@ -44,29 +46,18 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
     MotionError
         Where the poses are no motion: non-finite, off unit length, times not increasing.
     """
-    rows = read_rows(path)
-    header = [cell.strip() for cell in rows[0][1]] if rows else []
+    require_file(path)
+    with text_of(Path(path)) as (file, _):
+        header = cells_of(Path(path), 1, file.readline(), ',')
     columns = _columns(path, header)
-    if len(rows) == 1:
-        raise UnreadableFileError(path, 'no poses below the header')
-    numbers = np.empty((len(rows) - 1, len(header)))
-    for sample, (line, row) in enumerate(rows[1:]):
-        try:
-            numbers[sample] = [parse_number(cell) for cell in row]
-        except ValueError:
-            raise UnreadableFileError(
-                path, f'row {line} must hold {len(header)} numbers, but is {",".join(row)[:80]!r}',
-            ) from None
-
-    def take(*names: str) -> np.ndarray:
-        return numbers[:, [header.index(name) for name in names]]
-
-    time, position, orientation = take('time')[:, 0], take('x', 'y', 'z'), take(*POSE_COLUMNS[4:])
+    table = CsvTable(Path(path), ',', '.', header, len(header), 1, [])
+    numbers = np.stack(table.read(columns), axis=1)
+    time, position, orientation = numbers[:, 0], numbers[:, 1:4], numbers[:, 4:8]
     try:
         if columns == POSE_COLUMNS:
             motion = PlatformMotion.from_poses(time, position, orientation)
             return motion if rate is None else motion.resampled(rate)
-        v, omega, a, epsilon = (take(*TWIST_COLUMNS[k:k + 3]) for k in (0, 3, 6, 9))
+        v, omega, a, epsilon = np.split(numbers[:, 8:], 4, axis=1)
         motion = PlatformMotion(position, orientation, v, omega, a, epsilon, time)
     except MotionError as error:
         raise MotionError(f'{path}: {error.quantity}', error.found, error.rule,
