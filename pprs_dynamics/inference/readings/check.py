@@ -354,12 +354,12 @@ class Search:
         if has_weight and self.has_gain:
             fits += [fit_of(scales, price, what) for scales, price, what in self._by_drive(
                 factors, measured)]
-        found = max(fits, key=lambda fit: fit.score)
-        # Another direction of weight is credible only for efforts that show the weight.
-        concerned = [likelihood(d, float(found.scales[d])).prior for d in measured
-                     if d in reading.drives]
-        is_turned = reading.kind in ('position_offset', 'position_unit', 'mounting')
-        return None if is_turned and min(concerned, default=0.0) > table.PLAUSIBLE else found
+        if reading.kind in ('position_offset', 'position_unit', 'mounting'):
+            # Another direction of weight is credible only for efforts that show the weight.
+            fits = [fit for fit in fits if min([
+                likelihood(d, float(fit.scales[d])).prior for d in measured
+                if d in reading.drives], default=0.0) <= table.PLAUSIBLE]
+        return max(fits, key=lambda fit: fit.score, default=None)
 
     def _factors(self, evidence: Evidence, reading: Reading) -> Array:
         """Return the factor of weight and inertia in the efforts of each drive, (D,), or NaN."""
@@ -421,7 +421,7 @@ class Search:
             column = int(fit.reading.efforts[d])
             if evidence.is_measured(d, column):
                 some = Shares.of(evidence, d, column)
-                if abs(some.friction) > table.CERTAIN * some.friction_by_chance:
+                if some.has_friction:
                     votes += float(weights[d] * np.sign(some.friction))
         return votes <= 0
 
@@ -489,7 +489,7 @@ def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[Other
                               scales=_position_scales(model, reading))
     if fit.what in table.SHARES.values():
         yield OtherReading.of(
-            'effort_unit', drives, range(len(drives)), f'the effort of '
+            'effort_share', drives, range(len(drives)), f'the effort of '
             f"{named(drives, tuple(range(len(drives))))} looks like {fit.what} of the drives' "
             'largest', scales=_effort_scales(model, range(len(drives)), fit.scales))
     elif not np.all(np.isin(fit.scales, table.SCALES)):
