@@ -262,11 +262,6 @@ class Search:
             if fit.time_unit == best.time_unit == 1 and (same_motion or other_unit) and (
                     best.score - fit.score < table.SURE):
                 found.setdefault(fit.reading.kind, fit)
-        if best.what.startswith(table.EITHER):
-            evidence = self.evidence(best.reading, 1.0)
-            assert evidence is not None
-            factors = np.nan_to_num(self._factors(evidence, best.reading), nan=1.0)
-            found['drive_constant'] = replace(best, what='', scales=factors)
         return [*found.values()]
 
     def _turned(self, seed: Fit) -> Iterator[Fit]:
@@ -351,10 +346,9 @@ class Search:
         for scale in (scale for scale in units if has_weight or scale in table.OF_ONE):
             common = np.ones(count)
             common[np.isfinite(excerpt.effort[:, reading.efforts]).any(axis=0)] = scale
-            is_prefix, off = abs(scale) != table.KGF_CM, distance(scale, measured)
-            if off < (same if is_prefix else table.NEAR_UNIT):
-                fits.append(fit_of(common, _mistakes(scale), '' if is_prefix or (
-                    off < table.AT_UNIT) else table.EITHER))
+            if distance(scale, measured) < (table.NEAR_UNIT if abs(scale) == table.KGF_CM
+                                            else same):
+                fits.append(fit_of(common, _mistakes(scale)))
         if has_weight and self.has_gain:
             fits += [fit_of(scales, price, what) for scales, price, what in self._by_drive(
                 factors, measured)]
