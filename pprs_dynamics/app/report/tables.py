@@ -44,11 +44,13 @@ def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
         columns = (DriveColumns() if recorded.columns is None
                    else recorded.columns.drives.get(drive, DriveColumns()))
         current = 'current' in columns.names
+        in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
+                         for finding in summary.findings)
         for quantity, bounds, unit, factor in (
                 ('position', found.position, units.position, columns.position_scale),
                 ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
-                ('current' if current else 'effort', found.effort, units.effort,
-                 columns.effort_scale),
+                ('current' if current else 'effort', found.effort,
+                 'A' if in_amperes else units.effort, columns.effort_scale),
                 *((name, each, units.of(CHANNELS[name]), 1.0)
                   for name, each in found.channels.items())):
             if bounds is not None:

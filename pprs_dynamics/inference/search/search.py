@@ -194,6 +194,10 @@ class Search:
         for pair in combinations(best.candidates, 2):
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
+        # Two effects on one drive may be one there, and something else on other drives.
+        for one, other in combinations(best.blocks, 2):
+            if one.drive == other.drive is not None:
+                yield from self._instead(best, reduced(best, one, other), REPLACEMENTS, one.drive)
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
@@ -219,7 +223,7 @@ class Search:
         """
         divided = best.without(candidate)
         for component in candidate.components:
-            rest = exchanged(best, candidate, with_instead(candidate, component))
+            rest = reduced(best, component)
             found = self._instead(best, rest, REPLACEMENTS, component.drive)
             yield from found
             known = {component for c in rest for component in c.components}
@@ -260,6 +264,15 @@ def with_instead(candidate: EffectCandidate, gone: Component, *instead: Componen
     return EffectCandidate.of([*(component for component in candidate.components
                                  if component is not gone),
                                *instead])
+
+
+def reduced(fitted: CandidateSet, *gone: Component) -> Candidates:
+    """Return the candidates of a set without some components."""
+    kept = (tuple(component for component in c.components if component not in gone)
+            if isinstance(c, EffectCandidate) else () for c in fitted.candidates)
+    return tuple(EffectCandidate.of(components) if components else c
+                 for c, components in zip(fitted.candidates, kept, strict=True)
+                 if components or not c.components)
 
 
 def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:
