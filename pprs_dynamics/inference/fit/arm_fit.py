@@ -273,7 +273,8 @@ def of_passive(model: DriveModel, motion: JointMotion) -> Array:
     """Return the columns of viscous and dry friction of passive joints in loops, (N, n, K)."""
     if not model.robot.structure.loops:
         return np.zeros((len(motion), len(model.drives), 0))
-    effect, state = model.bound(JointFrictionEffect), model.mechanism(motion)
+    effect: Any = model.bound(JointFrictionEffect)
+    state = model.mechanism(motion)
     columns = [effect.at({name: 1.0}).force(state)
                for names in effect.variants if len(names) > 1 for name in names]
     return np.stack([np.zeros((len(motion), len(model.drives))), *columns], axis=-1)[..., 1:]
