@@ -261,7 +261,7 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                        'were tried')
     if others:
         remarks.append(f'The recordings also show {listed(others)}' + (
-            '' if case.validate else ', fitted as well for the errors on held-out blocks'))
+            '' if case.validate else '; held-out blocks are predicted with all of these'))
     prefix = f'effects.{name}.'
     return case.adoption(
         request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
