@@ -285,7 +285,8 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """The numbers over all drives, in at most two sentences."""
-        share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
+        share = ('' if np.isnan(self.relative) else
+                 f" ({percent(self.relative)} of the effort's variation)")
         little = f'{word_little(self.little)}; ' if self.little else ''
         error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
         error = error[:1].upper() + error[1:]

@@ -291,7 +291,10 @@ def _headline(diagnosis: Diagnosis) -> str:
     level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
-    return f'{begin}{lacking[1:]}. W{fall}{level}'
+    refuted = listed([f'{_title(diagnosis, effect)} ({effect.objection})'
+                      for effect in diagnosis.unconfirmed])
+    return f'{begin}{lacking[1:]}. ' + (f'Not confirmed: {refuted}.' if refuted
+                                        else f'W{fall}{level}')
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
