@@ -89,6 +89,8 @@ TITLES = {  # of a quantity: its columns, and their multiple of SI
         'Axis{}.fActTorque', 1.0)},
     'suffixes': {'q': ('pos{}_deg', DEGREE), 'tau': ('torque{}_mNm', 1e3)},
     'inches': {'q': ('Joint {} Angle, deg', DEGREE), 'tau': ('Joint {} Torque, lbf-in', 8.8507458)},
+    'both sides of a gear': {'x': ('motor_pos_{}', 100.0), 'q': ('joint_pos_{}', 1.0),
+                             'tau': ('joint_torque_{}', 1.0)},
     'measured': {'q': ('qm{}', 1.0), 'v': ('qdm{}', 1.0), 'tau': ('taum{}', 1.0)},
 }
 
@@ -161,3 +163,10 @@ def test_a_log_may_have_columns_of_words(tmp_path: Path) -> None:
     found = read_recording(path, first.model.recorded)
     np.testing.assert_allclose(found.position, q, atol=1e-6)
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+
+
+def test_velocities_contradict_the_unit_of_times(tmp_path: Path) -> None:
+    path, _ = written(tmp_path, {'q': ('q{}', 1.0), 'v': ('dq{}', 1.0), 'tau': ('tau{}', 1.0)})
+    path.write_text(path.read_text().replace('t [s]', 't [ms]'))
+    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
+    assert any('time_scale: 1' in question for question in first.questions)

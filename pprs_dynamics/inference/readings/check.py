@@ -630,14 +630,23 @@ def _factors(excerpt: Excerpt | None) -> dict[int, float]:
 
 
 def _of_rate(model: DriveModel, recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:
-    """Yield a rate of the model file that all recorded velocities contradict alike."""
+    """Yield a rate or a unit of times that all recorded velocities contradict alike."""
     columns, factors = model.recorded.columns, np.array([*_factors(excerpt).values()])
-    rate = None if columns is None else columns.rate
     factor = float(np.median(factors)) if len(factors) else 0.0
-    if rate is None or factor <= 0 or np.any(np.abs(factors / factor - 1) > table.RATE_OFF) or any(
-            abs(factor / unit - 1) < table.RATE_OFF for unit in (1.0, *table.VELOCITY_UNITS)):
+    if columns is None or factor <= 0 or np.any(np.abs(factors / factor - 1) > table.RATE_OFF):
         return
-    true_rate = float(f'{rate * factor:.3g}')
+    turns = all(units.turns for units in model.units)
+    times = [unit for each in table.TIMES for unit in (each, 1 / each)
+             if abs(factor / unit - 1) < table.RATE_OFF and columns.rate is None and turns]
+    for unit in times:  # no velocity of an angle is in thousandths
+        yield OtherReading(
+            'rate', len(recording.time), f'the recorded velocities are {unit:g} times the '
+            'derivatives of the positions, as if the times were in another unit',
+            scales=(('', 'time_scale', (columns.time_scale or 1.0) / unit),))
+    if columns.rate is None or any(abs(factor / unit - 1) < table.RATE_OFF
+                                   for unit in (1.0, *table.VELOCITY_UNITS)):
+        return
+    rate, true_rate = columns.rate, float(f'{columns.rate * factor:.3g}')
     yield OtherReading('rate', len(recording.time), f'the recorded velocities are {factor:.4g} '
                        f'times the derivatives of the positions at {rate:g} samples per second, '
                        f'as if there were {true_rate:g}', scales=(('', 'rate', true_rate),))

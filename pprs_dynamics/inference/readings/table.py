@@ -131,9 +131,12 @@ OTHERS = frozenset((
 # These tell of a command: taken only where nothing measured is there.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
-    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
+    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded', 'ff',
+    'feedforward'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
 FROM_OUTSIDE = frozenset(('ext', 'external', 'contact', 'dist', 'disturbance'))
+# The same of what was filtered, and of what is before a gear.
+SECONDARY = frozenset(('filtered', 'filt', 'smooth', 'smoothed', 'model', 'motor', 'rotor'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
