@@ -201,10 +201,21 @@ class Search:
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
+            for component in candidate.components if candidate.effect.shape else ():
+                yield from self._reshaped(best, candidate, component)
             if len(candidate.components) > 1:
                 yield from self._divided(best, candidate)
             if len(candidate.hypotheses) > 1:
                 yield from self._as_two(best, candidate)
+
+    def _reshaped(self, best: CandidateSet, candidate: EffectCandidate, component: Component,
+                  ) -> Iterator[Candidates]:
+        """Yield a set with an effect on one drive in the shapes that a scan has there."""
+        if component.drive is not None and component.course is None:
+            base = self.fits.at_noise_of(best, reduced(best, component))
+            for other in self.fits.components.local[component.drive].best_shapes(
+                    base.fit, component, REPLACEMENTS):
+                yield exchanged(best, candidate, with_instead(candidate, component, other))
 
     def _as_two(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
         """Yield a set with two effects in the place of one that claims two things."""
