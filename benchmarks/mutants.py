@@ -44,10 +44,8 @@ SEARCH = ('inference/test_hypothesis_space.py', 'inference/test_invariants_of_di
 ENGINES = ('physics/test_dynamics.py', 'physics/test_physics_engines.py')
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
 TESTS = {
-    'physics/three_pprs/inverse_kinematics.py': ENGINES,
     'physics/three_pprs/closed_form.py': ('physics/test_kinematics.py', *ENGINES),
-    'physics/three_pprs/rigid_body.py': ENGINES,
-    'physics/three_pprs/independent_chains.py': ENGINES,
+    'physics/effects/laws/joint_friction.py': ENGINES,
     'physics/effects/catalogue.py': ('physics/test_foreign_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),

@@ -138,9 +138,9 @@ def workbench_command(story: Story) -> str:
 def record(story: Story, effect: str, seed: int, duration: float) -> None:
     """Record two motions of a robot with a hidden effect; what it is, nobody here knows."""
     story.chapter('A robot with a secret')
-    story.say(f'A physics engine plays the robot. One effect out of {len(CATALOGUE)} that the '
-              'catalogue knows and a few that it does not is drawn and hidden in it. Its name '
-              f'goes to {story.file("truth.json")}, which stays closed till the end.')
+    story.say('A physics engine simulates the robot. It draws one hidden effect: one of the '
+              f'{len(CATALOGUE)} of the catalogue, or one of a few others. The effect is written '
+              f'to {story.file("truth.json")}, which is read only at the end.')
     # The folder is the demonstration's own, which may run again.
     for name in ('run.mcap', 'other.mcap'):
         (story.folder / name).unlink(missing_ok=True)
@@ -152,8 +152,8 @@ def record(story: Story, effect: str, seed: int, duration: float) -> None:
                          '--path-seed', '1', quiet=True)
     story.end(first)
     story.end(second)
-    story.say('other.mcap is another motion of the same robot. It is never fitted: what holds '
-              'there is no accident.')
+    story.say('other.mcap is another motion of the same robot. It is not fitted: the held-out '
+              'errors are measured on it.')
 
 
 def compare(story: Story) -> None:

@@ -214,10 +214,8 @@ def _counted(named: Any) -> Any:
 def operations(model: DriveModel, motion: PlatformMotion) -> None:
     """Print the floating-point operations of one sample."""
     _Counted.counts.clear()
-    one_pass = model._one_pass
-    assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    _is_sound(_counted(read_parameters(one_pass.parameters)), 0, table, NO_LOAD, _CountedTable())
+    _is_sound(_counted(read_parameters(model._own_parameters)), 0, table, NO_LOAD, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

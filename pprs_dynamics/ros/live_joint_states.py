@@ -38,8 +38,8 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_owner import ACTIVE, ModelOwner
-from pprs_dynamics.ros.node.parameters import overrides, plain_value
+from pprs_dynamics.ros.node.model_owner import ModelOwner
+from pprs_dynamics.ros.node.parameters import ACTIVE, overrides, plain_value
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 

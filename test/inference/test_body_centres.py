@@ -45,6 +45,27 @@ def test_the_columns_about_a_centre_are_exact_for_a_body_there(tmp_path: Path) -
     assert np.abs(np.tensordot(c, rows, 1) - expected).max() > 0.1 * np.abs(expected).max()
 
 
+def test_a_body_is_the_same_about_whichever_centre_its_columns_are(tmp_path: Path) -> None:
+    model = DriveModel.load(arm.write_arm(tmp_path))
+    kind = model.bound(LinkMass)
+    prefix = f'{kind.places[0].link}.'
+    rng = np.random.default_rng(3)
+    q, v, a = rng.uniform(-1, 1, (3, 25, 3))
+    none = model.robot.torques(q, v, a)
+    rows = np.stack([kind.at({c.name: 1.0}).changed(model.robot).torques(q, v, a) - none
+                     for c in kind.coefficients])
+    names = [c.name for c in kind.coefficients]
+    fitted = {f'{prefix}{name}': value for name, value in {
+        'mass': MASS, 'moment_x': 0.4, 'moment_y': -0.3, 'moment_z': 0.2,
+        'xx': 0.5, 'yy': 0.6, 'zz': 0.4, 'xy': 0.02, 'xz': -0.03, 'yz': 0.01}.items()}
+    c = np.array([fitted.get(name, 0.0) for name in names])
+    away = (0.3, -0.2, 0.5)
+    linear = np.tensordot(c, kind.rows_about(prefix, rows, np.array(away)), 1)
+    own = kind.about_own_centre(tuple(fitted), c, away)
+    body = kind.at(dict(zip(names, own.tolist(), strict=True)))
+    assert body.changed(model.robot).torques(q, v, a) - none == pytest.approx(linear, abs=1e-9)
+
+
 def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
     model = DriveModel.load(arm.write_arm(tmp_path))
     real = arm.real_arm(tmp_path)

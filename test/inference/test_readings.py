@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import made_up_arm
 import numpy as np
 import pytest
 from made_up_files import ARM, arm_efforts, motion
@@ -19,6 +20,7 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 DRIVES = ('shoulder', 'elbow')
@@ -150,6 +152,30 @@ def test_a_log_in_json_is_a_table(form: str, tmp_path: Path) -> None:
     path.write_text('{"text": "no table"}')
     with pytest.raises(UnreadableFileError, match='holds no table'):
         read_recording(path, first.model.recorded)
+
+
+@pytest.mark.parametrize('factor', [1.0, 180 / np.pi])
+def test_errors_of_a_model_are_no_other_reading(factor: float, tmp_path: Path) -> None:
+    """A load, wrong masses, friction and a gain: asked about is the unit of positions alone."""
+    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
+    own = model.robot.moved_mass
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        masses = np.array(model.robot.inertial) * np.exp(random.normal(0, 0.3, (3, 1)))
+        real = made_up_arm.real_arm(tmp_path, **{
+            'links.mass': tuple(masses[:, 0]), 'links.moment': tuple(masses[:, 1:4].ravel()),
+            'effects.active': ['payload_mass'],
+            'effects.payload_mass.mass': own * float(10 ** random.uniform(-1, 0.3))})
+        time, q, v, a = motion(random, 3, 1.0)
+        size = [0.8, 0.6, 0.25]
+        force = real.drive_forces(JointMotion(q * size, v * size, a * size, time)).total
+        effort = random.uniform(0.7, 1.5) * force + random.normal(0, 0.1, q.shape)
+        found = find_mistakes(model, Recording.from_arrays(
+            'run', time, q * size * [factor, factor, 1.0], None, effort, model.drives))
+        others = [each for each in found if isinstance(each, OtherReading)]
+        assert {scale[1:] for each in others for scale in each.scales} <= (
+            set() if factor == 1 else {('position_scale', 1 / factor)}), others
+        assert bool(others) == (factor != 1)
 
 
 def test_no_reading_is_found_where_nothing_is_wrong(arm: DriveModel) -> None:

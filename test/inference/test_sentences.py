@@ -122,6 +122,18 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     assert _parser(words).parse_args(words).topic == '/arm/joint_states'
 
 
+def test_an_effect_that_is_not_confirmed_is_named_and_nothing_is_adopted() -> None:
+    refuted = found_effect('hysteresis', objection='held-out data are predicted worse with it')
+    found = made_up_diagnosis('unknown', effects=(found_effect('coulomb_friction'),),
+                              unconfirmed=(refuted,))
+    assert word_diagnosis(found).headline == (
+        'The model lacks coulomb_friction on lift_2. Not confirmed: hysteresis on lift_2 '
+        '(held-out data are predicted worse with it).')
+    following, command = next_step(found, GivenFiles(('a.csv',)))
+    assert following.startswith('Do not add hysteresis')
+    assert command.startswith('pprs diagnose a.csv')
+
+
 @pytest.mark.parametrize('count', [0, 1, 2])
 def test_an_unexplained_error_is_recorded_again_before_anything_is_adopted(count: int) -> None:
     effects = (found_effect('coulomb_friction'), found_effect('time_delay'))[:count]

@@ -80,7 +80,7 @@ def test_tolerances_count_from_the_numbers_of_the_first_file(stages: list[dict[s
 DAMAGE = {
     'history.step_01.error_before': ('a lot', 'be a finite number'),
     'history.step_01.error_after': (-math.inf, 'be a finite number'),
-    'history.step_01.spans': ([0.0, math.nan], 'be a finite number'),
+    'history.step_01.spans': ([0.0, math.nan], 'be a list of finite numbers'),
     'history.step_01.noise_floor': (10 ** 400, 'be a finite number'),
     'history.step_01.forced': (0.5, 'be true or false'),
     'history.step_01.recordings': ('a.csv', 'be a list'),

@@ -61,7 +61,7 @@ def test_limits_tolerances_effects_and_node_keys_are_optional(tmp_path: Path) ->
 
 WRONG = [
     ('geometry.rod_length', -0.3, 'greater than 0'),
-    ('geometry.rod_length', True, 'be a number'),
+    ('geometry.rod_length', True, 'be a finite number'),
     ('geometry.elbow', 'sideways', 'one of up, down'),
     ('geometry.chain_angles', [0.0, 0.0, 1.0], 'three different directions'),
     ('masses.inertia', [0.005, 0.005, 0.02, 0.0, 0.0, 0.0], 'sum to at least the third'),

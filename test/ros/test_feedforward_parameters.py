@@ -85,7 +85,7 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
 
 
 REFUSED = [
-    ('masses.payload', -1.0, 'masses.payload is -1.0, must be at least 0'),
+    ('masses.payload', -1.0, 'masses.payload is -1.0, must be a finite number at least 0'),
     ('masses.paylod', 1.0, 'did you mean masses.payload'),
     ('limits.effort', [1.0, 2.0], 'limits.effort is [1.0, 2.0]'),
     ('friction.approach', 'third', 'whole_mechanism'),
@@ -127,7 +127,7 @@ def test_a_parameter_is_described_with_unit_and_rule(caller: Caller) -> None:
     described, = caller.call(DescribeParameters, 'describe_parameters',
                              names=['masses.payload']).descriptors
     assert '[kg]' in described.description
-    assert described.additional_constraints.startswith('must be a number at least 0')
+    assert described.additional_constraints.startswith('must be a finite number at least 0')
 
 
 def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(

@@ -137,6 +137,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
 
     found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
+    stage(progress, 'preparing the simulation (the first run compiles)')(0.0)
     share_done, robot = stage(progress, 'simulating'), as_mechanism(found)
     # With one seed the effects are the same on every path.
     drives = nominal = None

@@ -24,13 +24,13 @@ EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 def drives_table(comparison: Comparison) -> PlainTable:
     """Return the numbers of every drive; the page shows all of them, the terminal the first."""
-    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise')
+    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'grade')
     return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name
                        for name in headings)), [
         (name, plain(drive.rms), percent(drive.relative),
          rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
          percent(drive.explained_variance),
-         '' if drive.noise_floor is None else plain(drive.noise_floor, 2))
+         '' if drive.noise_floor is None else plain(drive.noise_floor, 2), drive.grade)
         for name, drive in comparison.drives.items()]
 
 
@@ -50,13 +50,11 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
     lines = [f'{number}. {statement.text}'
              for number, statement in enumerate(comparison.where, start=1)]
     shown = lines if details else lines[:FIRST]
-    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, shown)]
+    parts = [_drives_table(comparison, details), escape(comparison.verdict), *map(escape, shown)]
     if not lines:
         parts.append(NOWHERE)
     if len(lines) > len(shown):
         parts.append(f'… and {len(lines) - len(shown)} more, with --details, --json or --report')
-    if details:
-        parts += [escape(drive.verdict) for drive in comparison.drives.values()]
     if comparison.is_beyond_noise:
         words, command = following
         parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]
@@ -76,15 +74,16 @@ def _beside_table(comparison: Comparison, beside: Beside) -> Any:
          for name, before, after in rows], frame='none')
 
 
-def _drives_table(comparison: Comparison) -> Any:
+def _drives_table(comparison: Comparison, details: bool) -> Any:
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
     headings, rows = drives_table(comparison)
+    last = len(headings) if details else -1
     # One unit for all: names of joints need the room.
     short = len(comparison.unit) > 1
     return text_table(
         [heading.partition(' [')[0] if short and not heading.startswith('rms') else heading
-         for heading in headings],
-        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:])
+         for heading in headings[:last]],
+        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:last])
          for row, drive in zip(rows, comparison.drives.values(), strict=True)], frame='none')
 
 
@@ -137,7 +136,6 @@ def comparison_page(
     with page.fold('Drive by drive'):
         page.table(*drives_table(comparison),
                    [drive.grade for drive in comparison.drives.values()])
-        page.bullets([drive.verdict for drive in comparison.drives.values()])
     with page.fold('Over time'):
         page.text('Drag to zoom, on all drives at once; double-click to return. No peak is lost by '
                   'thinning.', 'note')

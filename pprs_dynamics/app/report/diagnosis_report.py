@@ -37,6 +37,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_d
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_EFFECTS = 4  # rows and values without --details
+MOST_PLACES = 2  # of an unexplained error without --details
 REFIT = 'numbers of the model'  # fitted together with the effects
 LEAST_REFIT = 0.01  # share of the error, from which these are listed
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
@@ -85,6 +86,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
             yield escape(f'  {f"{effect} on {drive}" if drive else effect}: {text}')
         if len(rows) > MOST_EFFECTS or len(values) > MOST_EFFECTS:
             yield f'  … all {len(rows)} rows and {len(values)} lines of values: --details'
+    for statement in diagnosis.depends_on[:MOST_PLACES]:
+        yield escape(f'  {statement.text}')
     if second := runner_up(diagnosis):
         yield f'[bold]Runner-up[/] {escape(second)}'
     if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.app.report.page import ErrorRow, Page
@@ -61,9 +60,7 @@ def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
     page = Page('Base model')
     if fit.little:
         page.text(sentence(f'{word_little(fit.little)}, fitted nevertheless'), 'lead')
-    held_out = f'; {", ".join(validate)} held out' if validate else ''
-    page.text(f'Model: {Path(model.source).name or "built in memory"}. Fitted to '
-              f'{", ".join(recordings)}{held_out}.', 'note')
+    page.sources(model.source, recordings, validate)
     page.errors([ErrorRow(name, fit.before[name], after, None)
                  for name, after in fit.after.items()],
                 'Error, rms, before (grey) and with the fitted numbers (blue).')

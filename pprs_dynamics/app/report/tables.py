@@ -23,16 +23,11 @@ if TYPE_CHECKING:
 
 def claims_table(claims: Iterable[Claim]) -> Any:
     """Return the paper's claims against what comes out."""
-    from rich.table import Table
-
-    table = Table(title='The paper\'s claims, and what comes out', show_lines=True)
-    for heading, width in (('claim', 34), ('paper', 16), ('found', 42)):
-        table.add_column(heading, max_width=width)
-    table.add_column('reproduced')
-    for claim in claims:
-        table.add_row(escape(claim.claim), escape(claim.paper), escape(claim.found),
-                      '[green]yes[/]' if claim.reproduced else '[red]no[/]')
-    return table
+    return text_table(
+        ('claim', 'paper', 'found', 'reproduced'),
+        [(escape(claim.claim), escape(claim.paper), escape(claim.found),
+          '[green]yes[/]' if claim.reproduced else '[red]no[/]') for claim in claims],
+        right=(), whole=(3,), show_lines=True, title='The paper\'s claims and their reproduction')
 
 
 def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
@@ -44,11 +39,13 @@ def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
         columns = (DriveColumns() if recorded.columns is None
                    else recorded.columns.drives.get(drive, DriveColumns()))
         current = 'current' in columns.names
+        in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
+                         for finding in summary.findings)
         for quantity, bounds, unit, factor in (
                 ('position', found.position, units.position, columns.position_scale),
                 ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
-                ('current' if current else 'effort', found.effort, units.effort,
-                 columns.effort_scale),
+                ('current' if current else 'effort', found.effort,
+                 'A' if in_amperes else units.effort, columns.effort_scale),
                 *((name, each, units.of(CHANNELS[name]), 1.0)
                   for name, each in found.channels.items())):
             if bounds is not None:

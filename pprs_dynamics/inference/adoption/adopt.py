@@ -260,7 +260,8 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
         remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
                        'were tried')
     if others:
-        remarks.append(f'The recordings also show {listed(others)}')
+        remarks.append(f'The recordings also show {listed(others)}' + (
+            '' if case.validate else '; held-out blocks are predicted with all of these'))
     prefix = f'effects.{name}.'
     return case.adoption(
         request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,

@@ -215,22 +215,6 @@ class DriveComparison:
             return 'poor'
         return 'good' if self.unexplained <= DECISIONS.good * self.effort else 'fair'
 
-    @property
-    def verdict(self) -> str:
-        """The numbers in words."""
-        share = ('of a constant effort' if np.isnan(self.relative)
-                 else f'{percent(self.relative)} of the effort')
-        error = f'{self.drive}: the error is {in_unit(self.rms, self.unit)} ({share})'
-        if self.rms == 0 or self.relative < DECISIONS.negligible:
-            return f'{error}: negligible'
-        if self.grade == 'noise':
-            has_pattern = self.pattern ** 2 >= DECISIONS.statement_share * self.rms ** 2
-            return f'{error}, {"mostly" if has_pattern else "all of it"} noise'
-        noise = ('the noise is not known' if self.noise_floor is None else
-                 f'{in_unit(self.noise_floor, self.unit)} of it is noise and '
-                 f'{in_unit(self.unexplained, self.unit)} unexplained')
-        return f'{error}; {noise}: {self.grade}'
-
 
 @dataclass(frozen=True)
 class Beside:
@@ -301,25 +285,26 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """The numbers over all drives, in at most two sentences."""
-        share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
+        share = ('' if np.isnan(self.relative) else
+                 f" ({percent(self.relative)} of the effort's variation)")
         little = f'{word_little(self.little)}; ' if self.little else ''
         error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
         error = error[:1].upper() + error[1:]
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
-        known = [drive for drive in beyond if drive.noise_floor is not None]
         if self.relative < DECISIONS.negligible:
             return f'{error}, which is negligible.'
         if not beyond:
             placed = sorted({place.drive for place in self.where})
             return f'{error}. It is noise{f", except on {listed(placed)}" if placed else ""}.'
-        worst = (max(known, key=lambda drive: drive.unexplained) if known else
-                 max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300)))
+        worst = max(beyond, key=lambda drive: drive.unexplained)
         where = 'every drive' if len(beyond) == len(self.drives) > 1 else listed(
             [drive.drive for drive in beyond])
+        known = any(drive.noise_floor is not None for drive in beyond)
         what = 'it is more than noise' if known else 'the noise is not known'
         worst_is = f'; the worst is {worst.drive} with ' if len(beyond) > 1 else ': '
+        kind = ' unexplained' if worst.noise_floor is not None else ', its noise unknown'
         return (f'{error}. On {where} {what}{worst_is}{in_unit(worst.unexplained, worst.unit)}'
-                f'{" unexplained" if known else ""} ({worst.grade}).')
+                f'{kind if known else ""} ({worst.grade}).')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""

@@ -167,7 +167,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                     'Diagnose that recording with the load in the model', other)
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
-    if diagnosis.unconfirmed and not effects:
+    if diagnosis.unconfirmed:
         return (f'Do not add {listed([effect.name for effect in diagnosis.unconfirmed])}. Record '
                 'another motion, and diagnose both recordings', both)
     if len(effects) == 1:

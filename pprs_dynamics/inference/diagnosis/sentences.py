@@ -25,7 +25,6 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     in_fitting_unit,
     in_unit,
     listed,
-    percent,
     plain,
     sentence,
     with_drives,
@@ -201,7 +200,7 @@ def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
         found.append(with_drives(
             f'a pattern {place_of(variable)}' if variable and unknown == 'unknown' else name,
             drives, diagnosis.residuals.drives))
-    return ' and '.join(found) or 'nothing missing'
+    return ' + '.join(found) or 'nothing missing'
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
@@ -276,7 +275,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         return 'No effect is supported by held-out data.' + ('' if is_noise else (
             f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
     groups = unexplained_groups(diagnosis)
-    places = [place_on(group) for group in groups[:2]] or [
+    places = [*dict.fromkeys(place_on(group) for group in groups[:2])] or [
         f'the error of {drive} is {ratio:.1f} times its noise'
         for drive, ratio in diagnosis.above_noise.items()]
     if places:
@@ -289,27 +288,23 @@ def _headline(diagnosis: Diagnosis) -> str:
         return f'No effect is reported. {unseen}' if unseen and not diagnosis.since else (
             f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
             f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
-    which = (' (the data do not separate these)'
-             if diagnosis.indistinguishable and len(effects) == 1 else '')
     level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
-    return f'{begin}{lacking[1:]}{which}. W{fall}{level}'
+    refuted = listed([f'{_title(diagnosis, effect)} ({effect.objection})'
+                      for effect in diagnosis.unconfirmed])
+    return f'{begin}{lacking[1:]}. ' + (f'Not confirmed: {refuted}.' if refuted
+                                        else f'W{fall}{level}')
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
     """Return which effects the model lacks, and which of its values the data contradict."""
     new = []
     for effect in diagnosis.effects:
-        title, rivals = _title(diagnosis, effect), _rivals(diagnosis, effect)
-        if effect.in_model:
-            continue
-        if len(diagnosis.effects) > 1:
-            other = (f', or {listed(rivals, "or")} in its place: the data do not separate these'
-                     if rivals else '')
-            new.append(f'{title} ({percent(-effect.share)}{other})')
-        else:
-            new.append(listed([title, *rivals], 'or'))
+        if not effect.in_model:
+            rivals = listed(_rivals(diagnosis, effect), 'or')
+            new.append(_title(diagnosis, effect)
+                       + (f' (or {rivals}: the data do not separate these)' if rivals else ''))
     return '; '.join([*([f'the model lacks {listed(new)}'] if new else []), *(
         _otherwise(diagnosis, effect) for effect in diagnosis.effects if effect.in_model)])
 
@@ -350,9 +345,8 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
     if issubclass(effect.effect, MeasurementEffect):
         what += '. It describes the sensor, and is never used in a command'
     data = 'the --validate recordings' if is_validated else 'held-out blocks of the same recording'
-    why = (f'Its force removes {percent(effect.share)} of the error: with it the error '
-           f'{change(effect.error_before, effect.error_after, unit)}. On {data} it '
-           f'{change(effect.held_out_before, effect.held_out_after, unit)}'
+    why = (f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
+           f'On {data} it {change(effect.held_out_before, effect.held_out_after, unit)}'
            f'{"" if is_validated else "; another motion with --validate is stronger evidence"}. '
            f'Evidence {effect.evidence:.0f} (threshold 0).')
     if effect.without is not None:

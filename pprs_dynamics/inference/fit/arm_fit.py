@@ -25,7 +25,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
     treated_forces,
 )
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.alike import alike_joints
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
     from_pseudo_inertia,
@@ -33,7 +33,6 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.mechanism.state import PassiveJoint
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
 
@@ -270,28 +269,15 @@ def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> Drive
         for key, numbers in found.items()}}, model.source)
 
 
-def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
-    """Return the passive joints of loops whose friction is not that of another joint.
-
-    Of those that are alike the first; none that goes as a drive does.
-    """
-    if not model.robot.structure.loops:
-        return ()
-    others = {name for group in alike_joints(model.robot) for name in group[1:]}
-    return tuple(joint for joint in model.robot.passive_joints if joint.name not in others)
-
-
 def of_passive(model: DriveModel, motion: JointMotion) -> Array:
-    """Return the columns of viscous and dry friction of `own_passive`, (N, n, 2 K)."""
-    joints = own_passive(model)
-    columns = np.zeros((len(motion), len(model.drives), 2 * len(joints)))
-    if joints:
-        state = model.mechanism(motion)
-        for k, joint in enumerate(joints):
-            for side, key in enumerate(('viscous', 'torque')):
-                columns[..., 2 * k + side] = state.against_friction(model.robot.friction_table(
-                    {joint.name: {key: 1.0, 'radius': joint.radius}}, model.reversal))
-    return columns
+    """Return the columns of viscous and dry friction of passive joints in loops, (N, n, K)."""
+    if not model.robot.structure.loops:
+        return np.zeros((len(motion), len(model.drives), 0))
+    effect: Any = model.bound(JointFrictionEffect)
+    state = model.mechanism(motion)
+    columns = [effect.at({name: 1.0}).force(state)
+               for names in effect.variants if len(names) > 1 for name in names]
+    return np.stack([np.zeros((len(motion), len(model.drives))), *columns], axis=-1)[..., 1:]
 
 
 def _of_each(joints: Array) -> Array:

@@ -202,10 +202,7 @@ class Search:
         if explains and start.most_left < table.CLOSE_FIT:
             return None
         if not (explains and start.most_left < table.EXPLAINED):
-            # A load explains efforts that are many times those of the masses.
-            self.fits += [fit for reading in self._loaded(first)
-                          if (fit := self.fit(reading, 1.0)) is not None
-                          and fit.most_left < table.GOOD_FIT]
+            self.fits += self._loaded(first, 1.0)
         for reading in readings(drives, self.model.units, self.are_counts):
             is_order = reading.kind == 'drive_order'
             if not is_order and explains and start.most_left < table.EXPLAINED:
@@ -222,21 +219,28 @@ class Search:
             if unit != 1 and (fit := self.fit(first, unit)) is not None:
                 self.fits.append(fit)
         if not (explains and start.most_left < table.EXPLAINED):
+            top = self._top()
+            if top.reading.kind == 'position_unit':
+                self.fits += self._loaded(top.reading, top.time_unit)
             for seed in (start, self._top()):
                 self.fits += self._turned(seed)
         best = self._top()
         is_sure = not best.is_plain and best.left <= table.GOOD_FIT and self._is_certain(best)
         return best if is_sure else None
 
-    def _loaded(self, first: Reading) -> list[Reading]:
-        """Return plain readings with loads at the tool, where a robot has one."""
+    def _loaded(self, reading: Reading, unit: float) -> list[Fit]:
+        """Return a reading with loads at the tool, where these explain the efforts.
+
+        A load may multiply the efforts of all drives, as another unit would.
+        """
         model = self.model
         if PayloadMass.name in model.values.get('effects.active', ()) or (
                 model.kind not in PayloadMass.acts_in):
             return []
         mass, most = model.robot.moved_mass, model.bound(PayloadMass).linear[0].upper
-        return [replace(first, load=share * mass, cost=table.COST['load'])
-                for share in table.LOADS if share * mass < most]
+        return [fit for share in table.LOADS if share * mass < most and (fit := self.fit(
+            replace(reading, load=share * mass, cost=reading.cost + table.COST['load']), unit))
+            is not None and fit.most_left < table.GOOD_FIT]
 
     def _top(self) -> Fit:
         """Return the best reading; of those that fit alike the first, which is the simplest."""
@@ -258,11 +262,6 @@ class Search:
             if fit.time_unit == best.time_unit == 1 and (same_motion or other_unit) and (
                     best.score - fit.score < table.SURE):
                 found.setdefault(fit.reading.kind, fit)
-        if best.what.startswith(table.EITHER):
-            evidence = self.evidence(best.reading, 1.0)
-            assert evidence is not None
-            factors = np.nan_to_num(self._factors(evidence, best.reading), nan=1.0)
-            found['drive_constant'] = replace(best, what='', scales=factors)
         return [*found.values()]
 
     def _turned(self, seed: Fit) -> Iterator[Fit]:
@@ -347,19 +346,18 @@ class Search:
         for scale in (scale for scale in units if has_weight or scale in table.OF_ONE):
             common = np.ones(count)
             common[np.isfinite(excerpt.effort[:, reading.efforts]).any(axis=0)] = scale
-            is_prefix, off = abs(scale) != table.KGF_CM, distance(scale, measured)
-            if off < (same if is_prefix else table.NEAR_UNIT):
-                fits.append(fit_of(common, _mistakes(scale), '' if is_prefix or (
-                    off < table.AT_UNIT) else table.EITHER))
+            if distance(scale, measured) < (table.NEAR_UNIT if abs(scale) == table.KGF_CM
+                                            else same):
+                fits.append(fit_of(common, _mistakes(scale)))
         if has_weight and self.has_gain:
             fits += [fit_of(scales, price, what) for scales, price, what in self._by_drive(
                 factors, measured)]
-        found = max(fits, key=lambda fit: fit.score)
-        # Another direction of weight is credible only for efforts that show the weight.
-        concerned = [likelihood(d, float(found.scales[d])).prior for d in measured
-                     if d in reading.drives]
-        is_turned = reading.kind in ('position_offset', 'position_unit', 'mounting')
-        return None if is_turned and min(concerned, default=0.0) > table.PLAUSIBLE else found
+        if reading.kind in ('position_offset', 'position_unit', 'mounting'):
+            # Another direction of weight is credible only for efforts that show the weight.
+            fits = [fit for fit in fits if min([
+                likelihood(d, float(fit.scales[d])).prior for d in measured
+                if d in reading.drives], default=0.0) <= table.PLAUSIBLE]
+        return max(fits, key=lambda fit: fit.score, default=None)
 
     def _factors(self, evidence: Evidence, reading: Reading) -> Array:
         """Return the factor of weight and inertia in the efforts of each drive, (D,), or NaN."""
@@ -421,7 +419,7 @@ class Search:
             column = int(fit.reading.efforts[d])
             if evidence.is_measured(d, column):
                 some = Shares.of(evidence, d, column)
-                if abs(some.friction) > table.CERTAIN * some.friction_by_chance:
+                if some.has_friction:
                     votes += float(weights[d] * np.sign(some.friction))
         return votes <= 0
 
@@ -489,7 +487,7 @@ def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[Other
                               scales=_position_scales(model, reading))
     if fit.what in table.SHARES.values():
         yield OtherReading.of(
-            'effort_unit', drives, range(len(drives)), f'the effort of '
+            'effort_share', drives, range(len(drives)), f'the effort of '
             f"{named(drives, tuple(range(len(drives))))} looks like {fit.what} of the drives' "
             'largest', scales=_effort_scales(model, range(len(drives)), fit.scales))
     elif not np.all(np.isin(fit.scales, table.SCALES)):
@@ -547,8 +545,8 @@ def in_reading(model: DriveModel, reading: Reading) -> DriveModel:
         key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
         changes[key] = tuple(mounted_gravity(model, reading.gravity).tolist())
     if reading.load:
-        changes = {'effects.active': [*model.values.get('effects.active', ()), PayloadMass.name],
-                   f'effects.{PayloadMass.name}.mass': reading.load}
+        changes['effects.active'] = [*model.values.get('effects.active', ()), PayloadMass.name]
+        changes[f'effects.{PayloadMass.name}.mass'] = reading.load
     return DriveModel.from_parameters({**model.values, **changes}, model.source) if (
         changes) else model
 
@@ -632,14 +630,23 @@ def _factors(excerpt: Excerpt | None) -> dict[int, float]:
 
 
 def _of_rate(model: DriveModel, recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:
-    """Yield a rate of the model file that all recorded velocities contradict alike."""
+    """Yield a rate or a unit of times that all recorded velocities contradict alike."""
     columns, factors = model.recorded.columns, np.array([*_factors(excerpt).values()])
-    rate = None if columns is None else columns.rate
     factor = float(np.median(factors)) if len(factors) else 0.0
-    if rate is None or factor <= 0 or np.any(np.abs(factors / factor - 1) > table.RATE_OFF) or any(
-            abs(factor / unit - 1) < table.RATE_OFF for unit in (1.0, *table.VELOCITY_UNITS)):
+    if columns is None or factor <= 0 or np.any(np.abs(factors / factor - 1) > table.RATE_OFF):
         return
-    true_rate = float(f'{rate * factor:.3g}')
+    turns = all(units.turns for units in model.units)
+    times = [unit for each in table.TIMES for unit in (each, 1 / each)
+             if abs(factor / unit - 1) < table.RATE_OFF and columns.rate is None and turns]
+    for unit in times:  # no velocity of an angle is in thousandths
+        yield OtherReading(
+            'rate', len(recording.time), f'the recorded velocities are {unit:g} times the '
+            'derivatives of the positions, as if the times were in another unit',
+            scales=(('', 'time_scale', (columns.time_scale or 1.0) / unit),))
+    if columns.rate is None or any(abs(factor / unit - 1) < table.RATE_OFF
+                                   for unit in (1.0, *table.VELOCITY_UNITS)):
+        return
+    rate, true_rate = columns.rate, float(f'{columns.rate * factor:.3g}')
     yield OtherReading('rate', len(recording.time), f'the recorded velocities are {factor:.4g} '
                        f'times the derivatives of the positions at {rate:g} samples per second, '
                        f'as if there were {true_rate:g}', scales=(('', 'rate', true_rate),))

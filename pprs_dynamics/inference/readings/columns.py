@@ -338,7 +338,8 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
     if not fits or {*key} & table.OTHERS:
         return (-1.0,)
     return (float(len(members)), float(not {*key} & (table.COMMANDS | table.FROM_OUTSIDE)),
-            float(bool({*key} & table.MEASURED)), -float(len(key)))
+            float(not {*key} & table.SECONDARY), float(bool({*key} & table.MEASURED)),
+            -float(len(key)))
 
 
 def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:

@@ -41,7 +41,6 @@ SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
-EITHER = 'kgf cm or amperes'
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
 # Directions of gravity in the base of a robot on a wall or under a ceiling.
 MOUNTINGS = {(0, 0, 1): '+z', (1, 0, 0): '+x', (-1, 0, 0): '-x', (0, 1, 0): '+y', (0, -1, 0): '-y'}
@@ -81,7 +80,7 @@ WEAK = 0.01  # efforts and swings that are this much smaller than others tell no
 
 # ------------------------------------------------------------------------- scales of efforts
 
-NEAR_UNIT, AT_UNIT = 0.15, 0.05  # relative distance from a unit's constant; a sure one
+NEAR_UNIT = 0.05  # relative distance from a unit's constant
 SAME_MASSES = 3.0  # factor by which masses of a description are off at most
 CERTAIN = 3.0  # standard errors
 
@@ -132,9 +131,12 @@ OTHERS = frozenset((
 # These tell of a command: taken only where nothing measured is there.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
-    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
+    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded', 'ff',
+    'feedforward'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
 FROM_OUTSIDE = frozenset(('ext', 'external', 'contact', 'dist', 'disturbance'))
+# The same of what was filtered, and of what is before a gear.
+SECONDARY = frozenset(('filtered', 'filt', 'smooth', 'smoothed', 'model', 'motor', 'rotor'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',

@@ -137,6 +137,7 @@ class Sensitivities:
                             for effect in catalogue().values())
         self.is_planned = False
         self._inertial: dict[type[AddedBody], Array] = {}
+        self._links: tuple[Any, Array] = None, np.empty(0)  # state, and its regressor
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
@@ -336,8 +337,10 @@ class Sensitivities:
             self._inertial[effect] = np.stack([
                 (effect.at({c.name: c.scale}).changed(robot).inertial - robot.inertial).ravel()
                 / c.scale for c in effect.coefficients])
-        links = robot.regressor(state.position, state.velocity, state.acceleration)
-        return [*np.tensordot(self._inertial[effect], links, (1, 2))]
+        if self._links[0] is not state:
+            self._links = state, robot.regressor(state.position, state.velocity,
+                                                 state.acceleration)
+        return [*np.tensordot(self._inertial[effect], self._links[1], (1, 2))]
 
 
 @dataclass(frozen=True)

@@ -84,8 +84,6 @@ class Reconstruction(DriveMotion):
         What effort and model both get: values (N, k) -> (M, k).
     gain : (D,) array
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
-    dropped : int
-        Samples of the recording's segments that are not here: edges and short segments.
     start : float
         Time of the recording's first sample, which may be dropped here [s].
     channels : mapping of str to (N, D) array
@@ -105,7 +103,6 @@ class Reconstruction(DriveMotion):
     effort: Array
     treat: Treatment
     gain: Array
-    dropped: int
     start: float
     channels: Mapping[str, Array]
     recorded: Recording
@@ -186,7 +183,6 @@ def follow(model: DriveModel, time: Array, drives: DriveMotion,
 
 def reconstruct(
     model: DriveModel, recording: Recording, progress: Progress | None = None,
-    window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
@@ -196,8 +192,6 @@ def reconstruct(
     recording : Recording
     progress : callable, optional
         Called with (samples done, all) now and then.
-    window : float, optional
-        Duration of the smoothing window [s], instead of the choice from the data.
 
     Raises
     ------
@@ -212,7 +206,7 @@ def reconstruct(
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
     unit = 'rad' if all(units.turns for units in model.units) else 'm'
-    drives = smooth_drives(recording, window, model.blocks_per_period, unit)
+    drives = smooth_drives(recording, None, model.blocks_per_period, unit)
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
@@ -230,7 +224,7 @@ def reconstruct(
     gain = np.full(len(names), np.nan) if recording.gain is None else recording.gain
     return Reconstruction(
         **vars(drives), time=time, motion=motion, effort=effort,
-        treat=Treatment(drives.block_starts, total), gain=gain, dropped=dropped,
+        treat=Treatment(drives.block_starts, total), gain=gain,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup)
 

@@ -23,6 +23,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.structure_effect import AddedBody
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
@@ -177,6 +178,9 @@ class Component:
     def total(self, coefficients: Array) -> Array:
         """Return all of the effect's coefficients, with those that the given model has."""
         every = self.every(coefficients)
+        if self.centre and issubclass(self.effect, AddedBody):
+            # Columns about another centre than the body's put its distance from it in its inertia.
+            every = self.effect.about_own_centre(self.names, every, self.centre)
         return every + np.array(self.given) if self.given else every
 
     def values(self, coefficients: Array) -> dict[str, float]:

@@ -135,6 +135,14 @@ class DriveComponents:
                 np.append(np.zeros(len(at)), 1.0) if known else None))
         return found
 
+    def best_shapes(self, fit: JointFit, like: Component, count: int) -> list[Component]:
+        """Return a component in the tried shapes that gain most at the noise of a fit."""
+        found = [(float(gain), component) for components, gains in self.score_test.gains(fit)
+                 for component, gain in zip(components, gains, strict=True)
+                 if component.effect is like.effect and component.names == like.names]
+        found.sort(key=lambda pair: -pair[0])
+        return [replace(like, shape=component.shape) for _, component in found[:count]]
+
     def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:
         """Return the best shape and variant of every effect, by name, with its gain at a noise."""
         best: dict[str, tuple[Component, float]] = {}

@@ -36,7 +36,7 @@ def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[Place
     base[[not column.in_model for column in fits.design.base]] = 0.0
     effects = []
     for component in fitted.blocks:
-        every = component.every(fitted.coefficients(component)).tolist()
+        every = replace(component, given=()).total(fitted.coefficients(component)).tolist()
         effects.append(PlacedEffect(
             component.effect, component.drive, component.parameters,
             {c.name: value

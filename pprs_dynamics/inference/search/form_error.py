@@ -21,6 +21,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
 # Independent shapes over which a form error is spread; a candidate is one of them. Measured on 62
 # paired recordings with 1 and 4: as many right but for one, and with 1 Coulomb and viscous friction
@@ -105,7 +106,7 @@ class FormErrors:
         squares = {
             other.name: share ** 2 * sum(size for d, size in of_drives.items() if d in drives)
             for other, of_drives in (self.forces(fitted) if forces is None else forces)
-            if other is not candidate}
+            if other is not candidate and (len(drives) > 1 or _is_free(other))}
         for name, by_band in self._given.items():
             is_own = name in self._own
             if not is_own or with_own:
@@ -160,3 +161,11 @@ class FormErrors:
         """Return the whitened squares of a block's force with coefficients c (k,)."""
         return {d: float(self.regression.weights(fitted.fit, d) @ (
             self.regression.products(block, [block], d)[0] @ c @ c)) for d in block.rows}
+
+
+def _is_free(effect: EffectCandidate) -> bool:
+    """Return whether the form error of an effect is another one on every drive.
+
+    That of a force on the tool is felt by all drives at once, so that nothing on one drive is it.
+    """
+    return effect.drives is not None or issubclass(effect.effect, PassiveJointEffect)

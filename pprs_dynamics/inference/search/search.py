@@ -194,13 +194,28 @@ class Search:
         for pair in combinations(best.candidates, 2):
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
+        # Two effects on one drive may be one there, and something else on other drives.
+        for one, other in combinations(best.blocks, 2):
+            if one.drive == other.drive is not None:
+                yield from self._instead(best, reduced(best, one, other), REPLACEMENTS, one.drive)
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)
+            for component in candidate.components if candidate.effect.shape else ():
+                yield from self._reshaped(best, candidate, component)
             if len(candidate.components) > 1:
                 yield from self._divided(best, candidate)
             if len(candidate.hypotheses) > 1:
                 yield from self._as_two(best, candidate)
+
+    def _reshaped(self, best: CandidateSet, candidate: EffectCandidate, component: Component,
+                  ) -> Iterator[Candidates]:
+        """Yield a set with an effect on one drive in the shapes that a scan has there."""
+        if component.drive is not None and component.course is None:
+            base = self.fits.at_noise_of(best, reduced(best, component))
+            for other in self.fits.components.local[component.drive].best_shapes(
+                    base.fit, component, REPLACEMENTS):
+                yield exchanged(best, candidate, with_instead(candidate, component, other))
 
     def _as_two(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
         """Yield a set with two effects in the place of one that claims two things."""
@@ -219,7 +234,7 @@ class Search:
         """
         divided = best.without(candidate)
         for component in candidate.components:
-            rest = exchanged(best, candidate, with_instead(candidate, component))
+            rest = reduced(best, component)
             found = self._instead(best, rest, REPLACEMENTS, component.drive)
             yield from found
             known = {component for c in rest for component in c.components}
@@ -260,6 +275,15 @@ def with_instead(candidate: EffectCandidate, gone: Component, *instead: Componen
     return EffectCandidate.of([*(component for component in candidate.components
                                  if component is not gone),
                                *instead])
+
+
+def reduced(fitted: CandidateSet, *gone: Component) -> Candidates:
+    """Return the candidates of a set without some components."""
+    kept = (tuple(component for component in c.components if component not in gone)
+            if isinstance(c, EffectCandidate) else () for c in fitted.candidates)
+    return tuple(EffectCandidate.of(components) if components else c
+                 for c, components in zip(fitted.candidates, kept, strict=True)
+                 if components or not c.components)
 
 
 def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:

@@ -271,6 +271,30 @@ class AddedBody(BodyEffect):
                 _turned(away, np.eye(3)[k])[OF_MOMENTS], turning, 1)
         return found
 
+    @classmethod
+    def about_own_centre(cls, names: tuple[str, ...], coefficients: Array,
+                         away: tuple[float, ...]) -> Array:
+        """Return coefficients of a body whose columns are about another centre than its own.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Of the coefficients that are fitted, its mass first.
+        coefficients : (k,) array
+            All of the effect.
+        away : (3,) tuple
+            Centre of its columns, from that of its place [m]; see `rows_about`.
+        """
+        prefix, known = names[0].removesuffix('mass'), [c.name for c in cls.coefficients]
+        inertia = [known.index(f'{prefix}{axes}') for axes in (*MOMENTS, *PRODUCTS)]
+        mass = coefficients[known.index(names[0])]
+        found: Array = coefficients.copy()
+        if mass and f'{prefix}xx' in names:
+            moment = coefficients[[known.index(f'{prefix}moment_{axis}') for axis in AXES]]
+            apart = moment / mass - np.array(away)
+            found[inertia] -= mass * _turned(apart, apart)[OF_MOMENTS] / 2
+        return found
+
     def changed(self, robot: Any) -> Any:
         """Return the robot with the bodies."""
         for place in self.places:

@@ -5,6 +5,10 @@
 
 A floating joint is three slides and three turns about its home; a `<mimic>` joint shares the
 coordinate of the joint that it follows.
+
+Closures are rows. Independent rows and passive coordinates are chosen by QR decomposition with
+pivoting at home. Lengths count in units of the mechanism's size there, so that metres and radians
+compare.
 """
 
 from __future__ import annotations

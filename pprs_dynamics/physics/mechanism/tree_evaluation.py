@@ -69,8 +69,8 @@ class InverseDynamicsResult(NamedTuple):
     efforts : (EFFORTS, N, D) array
         By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
         `closed_form` for the other rows of a 3-PPRS.
-    motion : three (N, D) arrays, or None
-        Position, velocity and acceleration of the drives, where they are known.
+    motion : three (N, D) arrays
+        Position, velocity and acceleration of the drives.
     """
 
     q: Any

@@ -72,60 +72,41 @@ class Key:
         """The requirement on a value, completing "must ..."."""
         if self.choices:
             return f'be one of {", ".join(self.choices)} ({self.description})'
-        if self.is_text:
-            form = 'be a name' if self.size is None else 'be a list of names'
-            return f'{form} ({self.description})'
-        form = ('be a number' if self.size is None else 'be a list of numbers'
-                if self.size == ANY else f'be a list of {self.size} numbers')
-        return self._described(f'{form} {self._bounds}' if self._bounds else form)
-
-    @property
-    def _bounds(self) -> str:
-        bounds = []
-        if self.positive:
-            bounds.append('greater than 0')
-        elif self.lower > -math.inf:
-            bounds.append(f'at least {self.lower:g}')
-        if self.upper < math.inf:
-            bounds.append(f'at most {self.upper:g}')
-        return ' and '.join(bounds)
-
-    def _described(self, rule: str) -> str:
+        kind = 'name' if self.is_text else 'finite number'
+        form = (f'a {kind}' if self.size is None else f'a list of {kind}s' if self.is_text
+                or self.size == ANY else f'a list of {self.size} {kind}s')
+        bounds = [text for text, is_bound in (
+            ('greater than 0', self.positive),
+            (f'at least {self.lower:g}', self.lower > -math.inf and not self.positive),
+            (f'at most {self.upper:g}', self.upper < math.inf)) if is_bound]
         unit = f' [{self.unit}]' if self.unit else ''
-        return f'{rule} ({self.description}{unit})'
+        return ' '.join(('be', form, *[' and '.join(bounds)] * bool(bounds),
+                         f'({self.description}{unit})'))
 
     def check(self, value: Any) -> Any:
-        """Return the value as a word, a float or a tuple of floats, or raise ModelError."""
-        if self.choices:
-            if not isinstance(value, str) or value not in self.choices:
-                raise ModelError(self.name, value, self.rule)
-            return value
+        """Return the value as a word, a float or a tuple of these, or raise ModelError."""
         if self.size is None:
-            return self._name(value, value) if self.is_text else self._number(value, value)
+            if not self._allows(value):
+                raise ModelError(self.name, value, self.rule)
+            return value if isinstance(value, str) else float(value)
         if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
             raise ModelError(self.name, value, self.rule)
-        if self.size != ANY and len(value) != self.size and not (
-                self.may_be_empty and not len(value)):
+        has_length = self.size in (ANY, len(value)) or (self.may_be_empty and not len(value))
+        if not has_length or not all(map(self._allows, value)):
             raise ModelError(self.name, list(value), self.rule)
+        return tuple(value if self.is_text else map(float, value))
+
+    def _allows(self, element: Any) -> bool:
+        """Return whether a value, or an element of a list, is one."""
+        if self.choices:
+            return isinstance(element, str) and element in self.choices
         if self.is_text:
-            return tuple(self._name(element, list(value)) for element in value)
-        return tuple(self._number(element, list(value)) for element in value)
-
-    def _name(self, element: Any, value: Any) -> str:
-        if not isinstance(element, str) or not (
-                element.strip() or (self.may_be_empty and not element)):
-            raise ModelError(self.name, value, self.rule)
-        return element
-
-    def _number(self, element: Any, value: Any) -> float:
-        if isinstance(element, bool) or not isinstance(element, (int, float)):
-            raise ModelError(self.name, value, self.rule)
+            return isinstance(element, str) and bool(
+                element.strip() or (self.may_be_empty and not element))
         # Compared before it is converted: a whole number of any length compares.
-        if not -LARGEST <= element <= LARGEST:
-            raise ModelError(self.name, value, self._described('be finite'))
-        if not self.lower <= element <= self.upper or (self.positive and element <= 0):
-            raise ModelError(self.name, value, self._described(f'be {self._bounds}'))
-        return float(element)
+        return (isinstance(element, (int, float)) and not isinstance(element, bool)
+                and -LARGEST <= element <= LARGEST and self.lower <= element <= self.upper
+                and (element > 0 or not self.positive))
 
 
 def _friction(joint: str, where: str, symbol: str) -> tuple[Key, ...]:

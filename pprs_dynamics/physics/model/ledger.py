@@ -10,13 +10,13 @@ was there before, so that it can be taken back exactly.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import LARGEST, as_list
+from pprs_dynamics.physics.model.keys import ANY, Key, as_list
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -216,15 +216,10 @@ def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
 
 
 def _checked(key: str, value: Any, kind: str) -> Any:
-    rules = {'str': 'a word', 'bool': 'true or false', 'float': 'a finite number'}
-    element = kind.removeprefix('tuple[').removesuffix(', ...]')
-    if kind != element:
-        if isinstance(value, str) or not isinstance(value, Sequence):
-            raise ModelError(key, value, 'be a list')
-        return tuple(_checked(key, item, element) for item in value)
-    right = {'str': isinstance(value, str), 'bool': isinstance(value, bool),
-             'float': isinstance(value, (int, float)) and not isinstance(value, bool)
-             and -LARGEST <= value <= LARGEST}[element]
-    if not right:
-        raise ModelError(key, value, f'be {rules[element]}')
-    return float(value) if element == 'float' else value
+    """Return a value of a field of some type, or raise ModelError."""
+    if kind == 'bool':
+        if not isinstance(value, bool):
+            raise ModelError(key, value, 'be true or false')
+        return value
+    return Key(key, 'of a step', size=ANY if kind.startswith('tuple') else None,
+               is_text='str' in kind, may_be_empty=True).check(value)

@@ -21,10 +21,9 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.node.parameters import HISTORY
 from pprs_dynamics.ros.node.qos import LATCHED, subscription
 
-ACTIVE = 'effects.active'
-HISTORY = 'history.'
 EFFECTS = 'effects.'
 
 Values = Mapping[str, Any]

@@ -78,6 +78,6 @@ class StribeckFriction(DriveEffect):
         """
         slowest, limit = ((SLOWEST_TURN, FASTEST_TURN) if covered.turns else (SLOWEST, FASTEST))
         fastest = np.clip(covered.top_speed / 2, 1e-5, limit)
-        velocities = np.geomspace(min(slowest, fastest / 10), fastest, 8)
+        velocities = np.geomspace(min(slowest, fastest / 10), fastest, 12)
         return [{'velocity': float(velocity), 'exponent': exponent}
                 for exponent in EXPONENTS for velocity in velocities]
