@@ -272,6 +272,15 @@ def test_joints_that_only_numbers_match_are_a_question(tmp_path: Path) -> None:
     assert 'joint_map: {j_1: leg1' in ' '.join(first.questions)
 
 
+def test_names_that_are_short_for_others_are_no_question(tmp_path: Path) -> None:
+    (tmp_path / 'arm.urdf').write_text(
+        f'<robot name="arm">{urdf(("joint_1", "joint_2", "joint_3"))}</robot>')
+    first = first_model(tmp_path / 'arm.urdf', bag(tmp_path, ('j1', 'j2', 'j3')),
+                        tmp_path / 'robot.yaml')
+    assert 'numbers' not in ' '.join(first.questions)
+    assert 'matched by the numbers' in ' '.join(first.notes)
+
+
 def test_a_recording_in_place_of_the_description_is_named_as_such(tmp_path: Path) -> None:
     (tmp_path / 'run.csv').write_text('time,a/position\n0,0\n')
     with pytest.raises(UnreadableFileError, match='description of the robot first'):

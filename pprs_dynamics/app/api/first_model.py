@@ -166,7 +166,10 @@ def first_model(
                      'to drive them, list them with friction: {motors: …}')
     by_numbers = False
     if contents.joints and not names.joints:
-        names, by_numbers = _by_numbers(contents, chosen), True
+        names = _by_numbers(contents, chosen)
+        by_numbers = not all(map(_is_short_for, names.joints, names.joints.values()))
+        if not by_numbers:
+            notes.append('joints are matched by the numbers in their names')
     draft = _Draft(path, Path(output), is_mjcf, description, base or root_of(description), branch,
                    chosen, names, [file.name for file in given])
     if given:
@@ -365,6 +368,13 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
             f'({", ".join(drives[:12])})' + (f'; is {close} {drives[0]}?' if close else '')
             + ': write joint_map: {JOINT: NAME} or rename them')
     return Names(found)
+
+
+def _is_short_for(one: str, other: str) -> bool:
+    """Return whether the words of one name begin with those of another, as j1 of joint_1."""
+    one, other = (''.join(word for word in words_of(name) if not word.isdigit())
+                  for name in (one, other))
+    return one.startswith(other) or other.startswith(one)
 
 
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Names,
