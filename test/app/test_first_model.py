@@ -264,21 +264,17 @@ def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path
             first_model(tmp_path / 'x.urdf')
 
 
-def test_joints_that_only_numbers_match_are_a_question(tmp_path: Path) -> None:
-    (tmp_path / 'arm.urdf').write_text(f'<robot name="arm">{urdf(("j_1", "j_2", "j_3"))}</robot>')
-    first = first_model(tmp_path / 'arm.urdf', bag(tmp_path, ('leg1', 'leg2', 'leg3')),
-                        tmp_path / 'robot.yaml')
-    assert 'matched by their numbers alone' in ' '.join(first.questions)
-    assert 'joint_map: {j_1: leg1' in ' '.join(first.questions)
-
-
-def test_names_that_are_short_for_others_are_no_question(tmp_path: Path) -> None:
+@pytest.mark.parametrize(('joint', 'recorded', 'asked'), [('j', 'leg', True),
+                                                          ('joint_', 'j', False)])
+def test_joints_that_only_numbers_match_are_a_question_but_for_short_names(
+    tmp_path: Path, joint: str, recorded: str, asked: bool,
+) -> None:
     (tmp_path / 'arm.urdf').write_text(
-        f'<robot name="arm">{urdf(("joint_1", "joint_2", "joint_3"))}</robot>')
-    first = first_model(tmp_path / 'arm.urdf', bag(tmp_path, ('j1', 'j2', 'j3')),
-                        tmp_path / 'robot.yaml')
-    assert 'numbers' not in ' '.join(first.questions)
-    assert 'matched by the numbers' in ' '.join(first.notes)
+        f'<robot name="arm">{urdf(tuple(f"{joint}{k}" for k in (1, 2, 3)))}</robot>')
+    first = first_model(tmp_path / 'arm.urdf', bag(
+        tmp_path, tuple(f'{recorded}{k}' for k in (1, 2, 3))), tmp_path / 'robot.yaml')
+    assert ('matched by their numbers alone' in ' '.join(first.questions)) == asked
+    assert (f'joint_map: {{{joint}1: {recorded}1' in ' '.join(first.questions)) == asked
 
 
 def test_a_recording_in_place_of_the_description_is_named_as_such(tmp_path: Path) -> None:
