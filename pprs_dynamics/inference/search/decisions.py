@@ -49,7 +49,7 @@ class Decisions:
     form_share: float = 0.15
     # The same for the input model's own friction, beside a further candidate. Load-dependent
     # friction is computed from frictionless loads, 1 to 2 % off.
-    own_form_share: float = 0.01
+    own_form_share: float = 0.015
     # Error that a drive may keep over its noise, beside what forms of effects leave. What stands
     # out of the noise to the eye must be reported.
     left_ratio: float = 1.5
