@@ -20,6 +20,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import (
+    DRIVE_WIDTHS,
     passive_reversal_columns,
     reversal_columns,
 )
@@ -28,6 +29,8 @@ from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
+
+WIDEST = 0.01  # of the top speed: dry friction has turned over by then, whatever the model's width
 
 
 def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
@@ -47,6 +50,8 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
             or effect.drive_memory() is not None):
         return np.zeros((0, len(design.residuals)))
     d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
+    widest = max(DRIVE_WIDTHS[-1] * width, WIDEST * design.covered[term.drive].top_speed)
+    widths = np.geomspace(DRIVE_WIDTHS[0] * width, widest, len(DRIVE_WIDTHS))
 
     def rows(recording: FullRate) -> Array:
         samples = recording.samples(slice(None), d)
@@ -54,7 +59,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
             replace(samples, direction=np.full_like(samples.velocity, sign)), **term.shape))
             for sign in (1.0, -1.0))
         return np.stack(reversal_columns(
-            (forward - backward) / 2, samples.velocity, samples.direction, width))
+            (forward - backward) / 2, samples.velocity, samples.direction, widths))
 
     return design.treated(rows)
 
