@@ -30,7 +30,9 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
-WIDEST = 0.01  # of the top speed: dry friction has turned over by then, whatever the model's width
+# Share of the top speed within which added dry friction may turn over, whatever the model's width:
+# presliding takes micrometres, which at usual accelerations are some mm/s.
+TURNS_OVER = 0.002
 
 
 def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
@@ -50,8 +52,8 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
             or effect.drive_memory() is not None):
         return np.zeros((0, len(design.residuals)))
     d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
-    widest = max(DRIVE_WIDTHS[-1] * width, WIDEST * design.covered[term.drive].top_speed)
-    widths = np.geomspace(DRIVE_WIDTHS[0] * width, widest, len(DRIVE_WIDTHS))
+    slowest = max(width, TURNS_OVER * design.covered[d].top_speed)
+    widths = [factor * (width if factor < 1 else slowest) for factor in DRIVE_WIDTHS]
 
     def rows(recording: FullRate) -> Array:
         samples = recording.samples(slice(None), d)
