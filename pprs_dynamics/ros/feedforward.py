@@ -32,6 +32,7 @@ from pprs_dynamics.ros.messages.conversions import (
     efforts,
     joint_state,
 )
+from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     TRAJECTORY,
@@ -127,11 +128,12 @@ class FeedforwardNode(ManagedNode):
         # Raw: message objects of a long trajectory would take longer than the model.
         self._inputs = [
             subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
-                         raw=True, profile=SETPOINTS)
+                         profile=SETPOINTS)
             for topic, reader in self._readers.items()]
         if JointTrajectoryControllerState is not None:
             self._inputs.append(subscription(
-                self, JointTrajectoryControllerState, self._controller_topic, self._on_controller))
+                self, JointTrajectoryControllerState, self._controller_topic,
+                only_whole(JointTrajectoryControllerState, self._on_controller)))
 
     def _publisher(self, kind: type, topic: str) -> Any:
         self._publishers_made.append(publisher(self, kind, topic))

@@ -310,7 +310,8 @@ class Feedforward:
         """
         found = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
         position, velocity, acceleration = found.drive_motion
-        if not duration or not (velocity[-1].any() or acceleration[-1].any()):
+        later = round(duration * NANOSECONDS)
+        if not later or not (velocity[-1].any() or acceleration[-1].any()):
             return found
         rest = np.zeros_like(velocity[-1:])
         stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, *self._limits.strokes)
@@ -320,7 +321,7 @@ class Feedforward:
         except PprsError:
             return found
         return DriveTrajectory(
-            np.append(found.offsets, found.offsets[-1] + round(duration * NANOSECONDS)),
+            np.append(found.offsets, found.offsets[-1] + later),
             (np.concatenate((position, stop)), np.concatenate((velocity, rest)),
              np.concatenate((acceleration, rest))), np.concatenate((found.effort, effort)))
 
