@@ -20,6 +20,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.drive_model import Margins, margins
 from pprs_dynamics.ros.force_command import (
     HOLD_GRAVITY,
+    SHORTEST_STOP,
     SILENT,
     DriveTrajectory,
     Feedforward,
@@ -59,7 +60,7 @@ except ImportError:  # then nothing is known of a controller
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
 LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
-STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` is 0
+STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` gives none
 
 
 class FeedforwardNode(ManagedNode):
@@ -375,7 +376,9 @@ class FeedforwardNode(ManagedNode):
         if left > 0:
             if self._sent.ends_at_rest:
                 return '; a trajectory controller completes its trajectory, which ends at rest'
-            stop_time = self._settings.node_values['stop_time'] or STOP_TIME
+            stop_time = self._settings.node_values['stop_time']
+            if stop_time < SHORTEST_STOP:
+                stop_time = STOP_TIME
             self._sent = self._feedforward.stop(left, stop_time, gravity)
             self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'
