@@ -53,7 +53,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
         return np.zeros((0, len(design.residuals)))
     d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
     slowest = max(width, TURNS_OVER * design.covered[d].top_speed)
-    widths = [factor * (width if factor < 1 else slowest) for factor in DRIVE_WIDTHS]
+    widths = np.array([factor * (width if factor < 1 else slowest) for factor in DRIVE_WIDTHS])
 
     def rows(recording: FullRate) -> Array:
         samples = recording.samples(slice(None), d)
