@@ -167,7 +167,7 @@ def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     model, recording = synthetic({}, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert not answer.adopted
-    assert 'would push along the motion' in answer.reason
+    assert 'more is taken away than the model has' in answer.reason
     rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
     model, recording = synthetic(rough, **rough, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])

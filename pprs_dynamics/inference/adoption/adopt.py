@@ -44,7 +44,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
@@ -52,8 +51,6 @@ DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
 SURE = 2.0  # standard deviations by which a number must differ from 0
-MOVING = 5.0  # widths of reversal, above which a drive moves
-PUSHES = 0.1  # of the moving time, in which friction may give power back
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 
 
@@ -245,8 +242,6 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                           f'{places and f" on {places}"}: beyond its bounds, or more is taken away '
                           'than the model has')
     residuals = case.residuals(case.recordings, case.model, after)
-    if request.effect.is_friction and not gone:
-        objections += _of_friction(effect, after, residuals[-1])
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(table.first.decisions.rival_margin)
         if name in (*rival.missing, *rival.instead)
@@ -403,28 +398,6 @@ def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
         return (f'{request.name} is in the model already, and the recordings support no other '
                 f'values: {more}',)
     return (f'the recordings do not support {request.name}: {more} than the model without it',)
-
-
-@outside_cost('adopt refuses friction that pushes along the motion')
-def _of_friction(effect: FoundEffect, model: DriveModel, residuals: Residuals) -> tuple[str, ...]:
-    """Return whether friction of a model would push along the motion, on a drive or in all."""
-    on_drives = [each.name for each in model.effects if each.name == ACTIVE_FRICTION or (
-        isinstance(each, DriveEffect) and each.is_friction)]
-    elsewhere = [each.name for each in model.effects if each.name == PASSIVE_FRICTION or (
-        isinstance(each, StructureEffect) and each.is_friction)]
-    velocity = residuals.variables['velocity']
-    moving = np.abs(velocity) > MOVING * np.asarray(model.reversal.velocity)
-    power = velocity * sum(residuals.parts.get(name, 0.0) for name in (
-        on_drives if effect.drives else [*on_drives, *elsewhere]))
-    for place in effect.drives or ('all drives',):
-        chosen = ([residuals.drives.index(place)] if effect.drives
-                  else range(len(residuals.drives)))
-        moves = moving[:, chosen].any(axis=1)
-        share = float(np.mean(power[moves][:, chosen].sum(axis=1) < 0)) if moves.any() else 0.0
-        if share > PUSHES:
-            return (f'friction on {place} would push along the motion in {share:.0%} of the '
-                    'moving time',)
-    return ()
 
 
 # A measured curve
