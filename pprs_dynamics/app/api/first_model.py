@@ -409,6 +409,8 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
             raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
                                   'samples per second')
         found['rate'] = guess.rate
+    if guess.time_fraction is not None:
+        found['time_fraction'] = guess.time_fraction
     if guess.time_scale is not None:
         found['time_scale'] = guess.time_scale
     if contents.decimal != '.':

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,10 +17,27 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
+from pprs_dynamics.measurement.files.recording import (
+    MOST_OF_TURN,
+    TURN_ROUNDING,
+    unwrapped,
+)
 from pprs_dynamics.measurement.files.samples import Series
-from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.table_files import (
+    TIME_COLUMNS,
+    TIME_LIKE,
+    fraction_of_seconds,
+)
 
 TIME_WORDS = {'time', *TIME_LIKE}
+QUANTITIES = {word for words in table.WORDS.values() for word in words}
+KNOWN = QUANTITIES | table.OTHERS
+ROLE = '(ist|soll|act|cmd|meas|fbk|des|ref)'
+# Words that another may precede in one: Gelenkmoment, but not timestamp nor payload.
+LONG, LONGER = ('|'.join(sorted((word for word in QUANTITIES if len(word) >= least), reverse=True))
+                for least in (3, 5))
+COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG})(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
+                      f'|([a-z]{{3,}})({LONGER})(?:e?[ns])?(?:{ROLE}(?:wert)?)?')
 
 
 class GuessError(PprsError, ValueError):
@@ -64,6 +82,8 @@ class Guess:
         Samples per second of a table without times [Hz].
     effort_kind : str
         By their names, where it is neither measured nor current; else empty.
+    time_fraction : str or int, optional
+        Parts of the seconds in `time`.
     """
 
     time: Column | None
@@ -73,6 +93,7 @@ class Guess:
     notes: list[str] = field(default_factory=list)
     rate: float | None = None
     effort_kind: str = ''
+    time_fraction: Column | None = None
 
 
 def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
@@ -97,8 +118,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     GuessError
         Where positions of the joints cannot be found, or two readings are as likely.
     """
-    time, time_scale, notes = _time(series, rate is not None)
-    left = [one for one in series if time is None or one.column != time.column]
+    time, fraction, time_scale, notes = _time(series, rate is not None)
+    left = [one for one in series if time is None or one.column not in (time.column, fraction)]
     # pandas numbers rows in a column without a title, as other programs do.
     left = [one for one in left if one.title or not _rises(one.values)
             or not _counts_rows(one.values)]
@@ -121,13 +142,20 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
+    without_unit = [key for key, column in columns.items() if key[1] == POSITION
+                    and unit_of(by_column[column].title) is None]
+    turn = min((turn_of(by_column[columns[key]].values) for key in without_unit), default=np.inf)
+    if turn < np.inf:
+        notes.append(f'positions begin again after {turn:.6g}: taken as a turn')
+        # Encoders of a robot's joints count alike.
+        scales.update(dict.fromkeys(without_unit, 2 * np.pi / turn) if turn != 2 * np.pi else {})
     outside = [column for (_, kind), column in columns.items() if kind == EFFORT
                and {*words_of(by_column[column].title)} & table.FROM_OUTSIDE]
     if outside:
         notes.append(f'{by_column[outside[0]].title} is an external torque by its name, from which '
                      'a model was taken out')
     guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
-                  table.EXTERNAL if outside else '')
+                  table.EXTERNAL if outside else '', fraction)
     return guess if quantity else _judge_velocities(guess, by_column, time)
 
 
@@ -170,15 +198,18 @@ def _words(text: str) -> list[str]:
 
 
 def _split(word: str) -> list[str]:
-    """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
-    known = {each for words in table.WORDS.values() for each in words}
-    for prefix in ('ist', 'soll'):  # Istposition
-        if word.startswith(prefix) and word.removeprefix(prefix) in known:
-            return [prefix, word.removeprefix(prefix)]
-    if word[:-1] in known and (len(word) > 3 or word[0] in 'qd') and word not in (
-            known | table.OTHERS) and word[-1] in table.LETTERS:
+    """Return the parts of a word that is several in one: posa, taum, Istposition, Gelenkwinkel.
+
+    The last letter of a quantity says actual or desired. A German or joined word ends in a
+    quantity, perhaps with ist or soll beside it.
+    """
+    if word in KNOWN or not word.isalpha():
+        return [word]
+    if word[:-1] in QUANTITIES and (len(word) > 3 or word[0] in 'qd') and (
+            word[-1] in table.LETTERS):
         return [word[:-1], table.LETTERS[word[-1]]]
-    return [word]
+    compound = COMPOUND.fullmatch(word)
+    return [part for part in compound.groups() if part] if compound else [word]
 
 
 def _listed(series: Sequence[Series]) -> str:
@@ -193,11 +224,16 @@ def _first(series: Sequence[Series]) -> str:
 
 
 def _time(series: Sequence[Series], has_rate: bool,
-          ) -> tuple[Series | None, float | None, list[str]]:
-    """Return the column of times, its unit [s] where it is not seconds, and comments."""
+          ) -> tuple[Series | None, Column | None, float | None, list[str]]:
+    """Return the times, a column of their fractions, their unit if not [s], and comments."""
     rising = [each for each in series if _rises(each.values)]
-    named = [each for each in rising if each.title in TIME_COLUMNS] or [
-        each for each in rising if _is_time(words_of(each.title))]
+    ours = [each for each in rising if each.title in TIME_COLUMNS]
+    for whole, part in () if ours else pairwise(series):
+        if _counts_parts(whole.values, part.values):
+            return replace(whole, values=whole.values + fraction_of_seconds(part.values)), (
+                part.column), None, [f'column {part.column} has the fractions of the seconds in '
+                                     f'column {whole.column}']
+    named = ours or [each for each in rising if _is_time(words_of(each.title))]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
@@ -206,7 +242,7 @@ def _time(series: Sequence[Series], has_rate: bool,
             each for each in rising if _is_even(each.values)
             and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
         if not even:
-            return None, None, notes
+            return None, None, None, notes
         # A counter of rows may come first.
         found = even[len(even) > 1 and _counts_rows(even[0].values)]
         notes.append(f'column {found.column} rises all the time: taken as time')
@@ -215,7 +251,18 @@ def _time(series: Sequence[Series], has_rate: bool,
     if scale is None and step > table.SLOWEST:
         scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
-    return replace(found, values=found.values * (scale or 1.0)), scale, notes
+    return replace(found, values=found.values * (scale or 1.0)), None, scale, notes
+
+
+def _counts_parts(whole: Array, part: Array) -> bool:
+    """Return whether numbers are whole parts of seconds: they fall whenever those rise."""
+    both = np.column_stack([whole, part])
+    steps = np.diff(both[np.isfinite(both).all(axis=1)], axis=0)
+    rises = steps[:, 0] > 0
+    return bool(np.any(rises) and np.all(both[np.isfinite(both)] % 1 == 0)
+                and np.all(steps[:, 0] >= 0) and 0 <= np.nanmin(part) and np.nanmax(part) < 1e9
+                and np.mean(rises == (steps[:, 1] < 0)) > 0.99
+                and _rises(whole + fraction_of_seconds(part)))
 
 
 def _is_time(words: Sequence[str]) -> bool:
@@ -399,7 +446,7 @@ class Links:
         """
         known = np.isfinite(values).all(axis=1) & np.isfinite(time)
         known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
-        values, time = values[known], time[known]
+        values, time = running_on(values[known]), time[known]
         count = values.shape[1]
         best = [np.full((count, count), np.nan) for _ in range(3)]
         if len(time) < table.LEAST_ROWS:
@@ -422,6 +469,20 @@ class Links:
             best = [np.where(better, new, old) for new, old in zip(
                 (found, slope, alike), best, strict=True)]
         return cls(*best)
+
+
+def turn_of(values: Array) -> float:
+    """Return after how much the angles of a column, (N,), begin again; infinite if they do not."""
+    known = values[np.isfinite(values)]
+    span, step = np.ptp(known), np.abs(np.diff(known)).max(initial=0.0)
+    return next((turn for unit in (1.0, *table.ANGLES, *table.COUNTS)
+                 if table.NEARLY < span / (turn := 2 * np.pi / unit) <= 1 + TURN_ROUNDING
+                 and step > MOST_OF_TURN * turn), np.inf)
+
+
+def running_on(values: Array) -> Array:
+    """Return columns, (N, M), of which angles run on that begin again after a turn."""
+    return unwrapped(values, [turn_of(column) for column in values.T])[0]
 
 
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
@@ -581,7 +642,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
     """
     known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
              & np.isfinite(time))
-    efforts, position, time = efforts[known], position[known], time[known]
+    efforts, position, time = efforts[known], running_on(position[known]), time[known]
     swing = np.var(efforts, axis=0)
     moves = swing > 0
     if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):

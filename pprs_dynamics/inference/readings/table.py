@@ -108,11 +108,11 @@ POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current
 # Words of a title, and the quantity that they tell.
 WORDS = {
     POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
-               'enc', 'encoder', 'ticks', 'winkel', 'lage'),
+               'enc', 'encoder', 'ticks', 'th', 'winkel', 'lage', 'stellung', 'hub', 'weg'),
     VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
-               'omega', 'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
-    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'torq', 'force', 'moment',
-             'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
+               'omega', 'qvel', 'dpos', 'v', 'thd', 'dth', 'drehzahl', 'geschwindigkeit'),
+    EFFORT: ('effort', 'efforts', 'eff', 'tau', 'torque', 'torques', 'trq', 'torq', 'force',
+             'moment', 'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
 }
@@ -173,6 +173,7 @@ ROUGHER = 1.5  # third differences of what has noise, over those of what has non
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
+NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
 LEAST_ROWS = 30
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
