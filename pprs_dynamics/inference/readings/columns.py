@@ -28,7 +28,9 @@ from pprs_dynamics.measurement.files.table_files import (
     TIME_LIKE,
     fraction_of_seconds,
 )
+from pprs_dynamics.system.plain_yaml import scalar
 
+Columns = dict[tuple[str, str], Column]
 TIME_WORDS = {'time', *TIME_LIKE}
 QUANTITIES = {word for words in table.WORDS.values() for word in words}
 KNOWN = QUANTITIES | table.OTHERS
@@ -50,19 +52,24 @@ class AmbiguousColumns(GuessError):
     Parameters
     ----------
     joints : sequence of str
-    readings : sequence of mapping of str to list of int
-        Places of columns by quantity.
-    series : sequence of Series
+    readings : sequence of mapping of (joint, quantity) to str or int
+        Columns; of no joint, times.
+    what : str
+        Why it is a question, as a clause.
     """
 
-    def __init__(self, joints: Sequence[str], readings: Sequence[Mapping[str, Sequence[int]]],
-                 series: Sequence[Series]) -> None:
-        self.lines = tuple(', '.join(
-            f'{joint}: {{' + ', '.join(f'{kind}: {series[places[k]].column}'
-                                       for kind, places in reading.items()) + '}'
-            for k, joint in enumerate(joints)) for reading in readings)
-        super().__init__('two readings of the columns are as likely, write one of them: '
+    def __init__(self, joints: Sequence[str], readings: Sequence[Columns], what: str) -> None:
+        self.lines = tuple(_line(joints, reading) for reading in readings)
+        super().__init__(f'{what}, write one of them: '
                          + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
+
+
+def _line(joints: Sequence[str], reading: Columns) -> str:
+    """Return what is below `columns` of a model file."""
+    entries = {joint: ', '.join(f'{key}: {scalar(column)}' for (of, key), column in reading.items()
+                                if of == joint) for joint in ('', *joints)}
+    return ', '.join(f'{scalar(joint)}: {{{entry}}}' if joint else entry
+                     for joint, entry in entries.items() if entry)
 
 
 @dataclass(frozen=True)
@@ -87,7 +94,7 @@ class Guess:
     """
 
     time: Column | None
-    columns: dict[tuple[str, str], Column]
+    columns: Columns
     scales: dict[tuple[str, str], float] = field(default_factory=dict)
     time_scale: float | None = None
     notes: list[str] = field(default_factory=list)
@@ -125,16 +132,23 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
             or not _counts_rows(one.values)]
     if not left:
         raise GuessError('no column holds numbers beside times')
+    stamp: Columns = {('', key): column for key, column in (
+        ('time', None if time is None else time.column), ('time_fraction', fraction))
+        if column is not None}
     titled = [one for one in left if one.title]
     if titled:
         columns, found = _by_names(titled, joints, quantity, others)
     else:
         count = max((len(each.values) for each in left), default=0)
         stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
-        columns, found = _by_numbers(left, joints, stamps, quantity, notes), []
+        columns, found = _by_numbers(left, joints, stamps, quantity, stamp, notes), []
     notes += found
     main = quantity or POSITION
     known = [joint for joint in joints if (joint, main) in columns]
+    if known and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
+        _ask_for_one(joints, stamp | columns, [each.column for each in titled if each.column not in
+                                       columns.values() and _fit(tuple(words_of(each.title)), {
+                                           '': each.column}, EFFORT, None)[0] > 0])
     if not known:
         raise GuessError(
             f'no columns of {main}s are told by their names: {_listed(left)}; write them '
@@ -260,7 +274,7 @@ def _counts_parts(whole: Array, part: Array) -> bool:
     steps = np.diff(both[np.isfinite(both).all(axis=1)], axis=0)
     rises = steps[:, 0] > 0
     return bool(np.any(rises) and np.all(both[np.isfinite(both)] % 1 == 0)
-                and np.all(steps[:, 0] >= 0) and 0 <= np.nanmin(part) and np.nanmax(part) < 1e9
+                and np.all(steps[:, 0] >= 0) and np.nanmin(part) >= 0 and np.nanmax(part) < 1e9
                 and np.mean(rises == (steps[:, 1] < 0)) > 0.99
                 and _rises(whole + fraction_of_seconds(part)))
 
@@ -289,7 +303,7 @@ def _counts_rows(values: Array) -> bool:
 
 
 def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | None,
-              others: Collection[str]) -> tuple[dict[tuple[str, str], Column], list[str]]:
+              others: Collection[str]) -> tuple[Columns, list[str]]:
     groups: dict[tuple[str, ...], dict[str, Column]] = {}
     unnamed = []
     for one in series:
@@ -312,7 +326,7 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     if len(joints) == 1:
         for one in series:
             groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
-    columns: dict[tuple[str, str], Column] = {}
+    columns: Columns = {}
     currents_are_measured = False
     wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
     for each in wanted:
@@ -486,7 +500,7 @@ def running_on(values: Array) -> Array:
 
 
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
-                quantity: str | None, notes: list[str]) -> dict[tuple[str, str], Column]:
+                quantity: str | None, stamp: Columns, notes: list[str]) -> Columns:
     """Return columns without names by what they are of each other, in any order."""
     count = len(joints)
     if quantity:
@@ -508,9 +522,24 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
                 key=lambda kinds: _roughness(values[:, kinds[POSITION]]))
     efforts = [group for _, other, group in near if other is kinds]
     unlike = next((group for group in efforts if not _are_alike(values, efforts[0], group)), None)
+    used = {place for places in kinds.values() for place in places}
+    known = stamp | {(joint, kind): series[place].column for kind, places in kinds.items()
+                     for joint, place in zip(joints, places, strict=False)}
     if unlike:
-        raise AmbiguousColumns(joints, [{**kinds, EFFORT: group}
-                                        for group in (efforts[0], unlike)], series)
+        raise AmbiguousColumns(joints, [known | {
+            (joint, EFFORT): series[place].column for joint, place in zip(
+                joints, group, strict=False)} for group in (efforts[0], unlike)],
+            'two readings of the columns are as likely')
+    shares = _shares(values[:, efforts[0]], values[:, kinds[POSITION]], time) if efforts else []
+    if not efforts or min(shares) < table.UNLIKE_EFFORT < max(shares):
+        _ask_for_one(joints, known, [
+            each.column for place, each in enumerate(series) if place not in used])
+    if len(series) == count and not count % 2:
+        half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]
+        raise AmbiguousColumns(
+            joints, [known, stamp | dict(zip(half, (each.column for each in series), strict=True))],
+            f'there are positions of {count} joints, or positions and efforts of {count // 2} '
+            f'(then give --drives {",".join(joints[:count // 2])})')
     if efforts:
         kinds = {**kinds, EFFORT: _measured(values, efforts)}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
@@ -521,6 +550,15 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
         f'; {_span(series, unused)} not used' if unused else ''))
     return {(joint, kind): series[place].column for kind, places in kinds.items()
             for joint, place in zip(joints, places, strict=False)}
+
+
+def _ask_for_one(joints: Sequence[str], known: Columns, efforts: Sequence[Column]) -> None:
+    """Raise AmbiguousColumns: a column may be the effort of one joint, or of another."""
+    if len(joints) > 1 and efforts:
+        raise AmbiguousColumns(joints, [known | {(joint, EFFORT): column} for column in efforts[:2]
+                                        for joint in joints],
+                               f'no {len(joints)} columns are efforts of {", ".join(joints)}; '
+                               f'column {efforts[0]} may be that of one joint')
 
 
 def _are_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
@@ -636,7 +674,13 @@ def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
 
 
 def _explained(efforts: Array, position: Array, time: Array) -> float:
-    """Return the share of efforts that gravity, friction and inertia of any size explain.
+    """Return the mean of `_shares`; -1 where no effort changes."""
+    shares = _shares(efforts, position, time)
+    return float(np.mean(shares)) if shares else -1.0
+
+
+def _shares(efforts: Array, position: Array, time: Array) -> list[float]:
+    """Return the shares of efforts that change, which gravity, friction and inertia may explain.
 
     Positions may be in any unit of angles.
     """
@@ -646,9 +690,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
     swing = np.var(efforts, axis=0)
     moves = swing > 0
     if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):
-        return 0.0
-    if not np.any(moves):
-        return -1.0
+        return [0.0]
     half = max(2, len(time) // 200)
 
     def rate_of(values: Array) -> Array:
@@ -661,7 +703,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
     width = root_mean_square(speed) / 10 or 1.0
     rate = rate_of(speed)
     common = [np.ones(len(time)), speed, np.tanh(speed / width), rate]
-    shares = []
+    shares: list[list[float]] = []
     for unit in (1.0, *table.ANGLES, *table.COUNTS):
         angle = unit * position
         total = np.cumsum(angle, axis=1)
@@ -670,8 +712,8 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
             *(each * rate for each in np.cos(angle).T[1:, :, None])])
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
-        shares.append(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
-    return float(max(shares))
+        shares.append((1 - np.var(rest, axis=0)[moves] / swing[moves]).tolist())
+    return max(shares, key=sum)
 
 
 # ------------------------------------------------------------------------------------ units

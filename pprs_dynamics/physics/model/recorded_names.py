@@ -5,10 +5,10 @@
 
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
 time_fraction: COLUMN, time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …},
-DRIVE: {position: COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN, pressure: COLUMN,
-effort_scale: NUMBER, position_scale: NUMBER, position_offset: NUMBER, velocity_scale: NUMBER,
-effort_sign_bit: NUMBER}}`, a `temperature: COLUMN` or `pressure: COLUMN` of the whole machine
-there, and `effort_kind`: what efforts are.
+DRIVE: {position: COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN,
+pressure: COLUMN, effort_scale: NUMBER, position_scale: NUMBER, position_offset: NUMBER,
+velocity_scale: NUMBER, effort_sign_bit: NUMBER}}`, a `temperature: COLUMN` or `pressure: COLUMN` of
+the whole machine there, and `effort_kind`: what efforts are.
 """
 
 from __future__ import annotations
