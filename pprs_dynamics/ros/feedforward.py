@@ -197,8 +197,8 @@ class FeedforwardNode(ManagedNode):
             request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
-            self._lag.append(max(0.0, _since(info['received_timestamp'])
-                              - (time.perf_counter() - began)))
+            waited = _since(info['received_timestamp']) - (time.perf_counter() - began)
+            self._lag.append(max(0.0, waited))
         self._report_condition(answer)
 
     def _command(self, command: ForceCommand) -> None:
