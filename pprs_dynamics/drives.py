@@ -107,7 +107,7 @@ class RecordedColumns(NamedTuple):
     channels : mapping of str to str or int
         By quantity: a column of the whole machine, for drives that have none of their own.
     time_fraction : str or int, optional
-        Milliseconds, microseconds or nanoseconds beside whole seconds in `time`.
+        Milliseconds, microseconds or nanoseconds to be added to whole seconds in `time`.
     """
 
     time: Column | None = None

@@ -393,9 +393,8 @@ class Search:
                         np.abs(np.log(sizes / scales[measured])) < same):
                     yield signs[0] * scales, price + table.COST['effort_unit'] + 1.0, name
         # A load may multiply what one drive of several needs.
-        off = np.abs(np.log(sizes))
-        if len(measured) >= min(2, len(factors)) and off.max() > same and np.all(
-                off > np.log(table.OTHER_UNIT)) and np.all(sizes > table.LARGEST_COMPLIANCE):
+        if len(measured) >= min(2, len(factors)) and np.all(
+                np.abs(np.log(sizes)) > same) and np.all(sizes > table.LARGEST_COMPLIANCE):
             yield (np.where(np.isin(np.arange(len(factors)), measured), factors, 1.0),
                    price + table.COST['drive_constant'], '')
 
@@ -518,7 +517,8 @@ def _constants(model: DriveModel, factors: Array) -> OtherReading:
     return OtherReading.of(
         'drive_constant', model.drives, every, f'the effort of {named(model.drives, every)} is '
         f'another multiple of what the masses need: {listed}: it looks like currents in amperes, '
-        'percent of a torque, or another unit', f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
+        'percent of a torque, or another unit',
+        f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
 
 
 def _unit(model: DriveModel, group: Sequence[int], scales: Array) -> OtherReading:

@@ -215,7 +215,7 @@ def _split(word: str) -> list[str]:
     """Return the parts of a word that is several in one: posa, taum, Istposition, Gelenkwinkel.
 
     The last letter of a quantity says actual or desired. A German or joined word ends in a
-    quantity, perhaps with ist or soll beside it.
+    quantity, perhaps followed by ist or soll.
     """
     if word in KNOWN or not word.isalpha():
         return [word]
