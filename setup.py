@@ -79,7 +79,6 @@ setup(
                  'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11',
                  'axe-playwright-python>=0.1.4',  # accessibility of pages
-                 'cosmic-ray>=8.3',  # make mutants
                  'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',

@@ -310,8 +310,9 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
     if len(chosen) < len(request.drives or (None,)):
         standing = [name for name in request.drives or design.drives
                     if not design.moves(design.drives.index(name))]
-        raise EffectRequestError(f'{", ".join(standing)} hardly moved in the recordings' if standing
-                             else f'{request.name} has no force in these recordings')
+        raise EffectRequestError(
+            f'{", ".join(standing)} hardly moved in the recordings' if standing
+            else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
     return Row(*linearised(fits, fitted), 0.0)
 
