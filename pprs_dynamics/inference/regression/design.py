@@ -461,14 +461,7 @@ class Design:
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
 
-        def columns(recording: FullRate, part: slice) -> Array:
-            memory = effect.drive_memory()
-            if memory is not None:
-                effect.begin(memory, recording.start)
-            return np.stack(effect.columns(recording.samples(part, drive, memory), **shape))
-
-        return self.shown(drive, lambda recording: np.concatenate(
-            [columns(recording, part) for part in recording.segments], axis=1))
+        return self.shown(drive, lambda recording: recording.columns(effect, drive, shape))
 
     def shown(self, drive: int, rows: Callable[[FullRate], Array]) -> Array:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""

@@ -12,7 +12,6 @@ follow a delay that is none, and make good what it does to the forces.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ TURNS_OVER = 0.002
 def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
     """Return what a term's friction changes by if it reverses in other widths, (w, M) [N].
 
-    None, (0, M), for an effect that is no friction or has a memory.
+    None, (0, M), for an effect that is no friction.
 
     Parameters
     ----------
@@ -48,8 +47,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
         By which its rows are multiplied.
     """
     effect = term.effect
-    if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
-            or effect.drive_memory() is not None):
+    if term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect):
         return np.zeros((0, len(design.residuals)))
     d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
     slowest = max(width, TURNS_OVER * design.covered[d].top_speed)
@@ -57,9 +55,8 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
 
     def rows(recording: FullRate) -> Array:
         samples = recording.samples(slice(None), d)
-        forward, backward = (coefficients @ np.stack(effect.columns(
-            replace(samples, direction=np.full_like(samples.velocity, sign)), **term.shape))
-            for sign in (1.0, -1.0))
+        forward, backward = (coefficients @ recording.columns(effect, d, term.shape, sign)
+                             for sign in (1.0, -1.0))
         return np.stack(reversal_columns(
             (forward - backward) / 2, samples.velocity, samples.direction, widths))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.effects.drive_effect import DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -101,6 +101,20 @@ class FullRate:
             self.acceleration[part, drive], self.direction[part, drive],
             self.friction_load[part, drive], self.transmitted[part, drive], memory,
             {name: values[part, drive] for name, values in self.channels.items()})
+
+    def columns(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float],
+                direction: float | None = None) -> Array:
+        """Return the columns of an effect, (k, N), as if the drive had one direction if given."""
+        found = []
+        for part in self.segments:
+            memory = effect.drive_memory()
+            if memory is not None:
+                effect.begin(memory, self.start)
+            samples = self.samples(part, drive, memory)
+            if direction is not None:
+                samples = replace(samples, direction=np.full_like(samples.velocity, direction))
+            found.append(np.stack(effect.columns(samples, **shape)))
+        return np.concatenate(found, axis=1)
 
 
 @dataclass(frozen=True)
