@@ -99,6 +99,17 @@ def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> N
         abs=1e-8)
 
 
+@pytest.mark.parametrize('name', [
+    'coulomb_friction', 'load_friction', 'gear_efficiency', 'hysteresis', 'friction_drift'])
+def test_friction_of_an_axis_that_turns_over_17_times_more_slowly_than_the_models_is_named(
+        name: str) -> None:
+    run = simulate_mechanism(AXIS, (name,), 2, duration=20.0)
+    assert run.motion.time is not None
+    found = diagnose(AXIS, [Recording.from_arrays(
+        'run', run.motion.time, run.position, None, run.effort, AXIS.drives)])
+    assert (found.verdict, [effect.name for effect in found.effects]) == ('effect', [name])
+
+
 def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
     with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
         simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)

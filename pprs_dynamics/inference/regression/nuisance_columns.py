@@ -55,10 +55,11 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
 
     def rows(recording: FullRate) -> Array:
         samples = recording.samples(slice(None), d)
-        forward, backward = (coefficients @ recording.columns(effect, d, term.shape, sign)
-                             for sign in (1.0, -1.0))
+        forward, backward, still = (coefficients @ recording.columns(effect, d, term.shape, sign)
+                                    for sign in (1.0, -1.0, 0.0))
         return np.stack(reversal_columns(
-            (forward - backward) / 2, samples.velocity, samples.direction, widths))
+            (forward - backward) / 2, samples.velocity, samples.direction, widths,
+            (forward + backward) / 2 - still))
 
     return design.treated(rows)
 

@@ -426,7 +426,8 @@ def following(model: DriveModel) -> list[Effect]:
             and effect.initial_memory() is None]
 
 
-def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Array) -> list[Array]:
+def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Array,
+                     even: Array | float = 0.0) -> list[Array]:
     """Return what dry friction that turns over otherwise changes, (N, D) each.
 
     Parameters
@@ -437,15 +438,18 @@ def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Arra
         [m/s], and its sgn as the model has it.
     widths : (W,) or (W, D) array
         Other widths of the sgn [m/s].
+    even : (N, D) array, optional
+        What is in proportion to the square of the sgn [N].
 
     Returns
     -------
     list
-        A column for each width, odd in the direction; and an even one, for friction
-        that differs by direction while it turns over.
+        A column for each width; and an even one, for friction that differs by direction while
+        it turns over.
     """
-    odd = [dry * (smooth_sign(velocity, width) - direction) for width in widths]
-    return [*odd, dry * (1 - np.abs(direction))]
+    signs = [smooth_sign(velocity, width) for width in widths]
+    return [*(dry * (sign - direction) + even * (sign ** 2 - direction ** 2) for sign in signs),
+            dry * (1 - np.abs(direction))]
 
 
 def passive_reversal_columns(friction: Effect, state: Any) -> Array:
