@@ -34,7 +34,7 @@ from pprs_dynamics.physics.model.keys import GAIN
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-NODES_PER_PERIOD = 120  # see `Samples`
+NODES_PER_PERIOD = 40  # see `Samples`
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
