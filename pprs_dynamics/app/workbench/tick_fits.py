@@ -26,7 +26,6 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component, E
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import (
-    exact_forces,
     fitted_model,
     linear_residual,
     linearised,
@@ -292,4 +291,4 @@ class TickFits:
             fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
-        return Exact(model, self.measured - exact_forces(fits.design, model), parameters)
+        return Exact(model, self.measured - fits.design.exact_forces(model), parameters)

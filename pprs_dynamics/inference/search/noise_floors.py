@@ -53,8 +53,8 @@ def noise_floors(fits: FittedSets, period: float | None = None,
     regression, residuals = fits.regression, fits.design.residuals
     fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
     # Degrees of freedom that the columns leave, and the shares of both noises that lie there.
-    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).solve(
-        fit.spectra, regression.counts).leverage, 0.0)
+    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).leverage(
+        fit.covariance, fit.spectra), 0.0)
     powers = [noise.amplitudes @ regression.noise_shapes.at_bands for noise in (
         fit, reported or fit)]
     seen = np.all([np.sum(free * power, axis=1) >= fits.decisions.noise_seen * np.sum(
