@@ -306,10 +306,20 @@ class Mechanism:
 
     def one_pass(self, motion: JointMotion | PlatformMotion,
                  parameters: tuple[JointFriction, Array], closed: dict[Any, Array] | None,
-                 ) -> InverseDynamicsResult | None:
+                 has_state: bool = False) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
+
+        Parameters
+        ----------
+        motion : JointMotion or PlatformMotion
+        parameters : tuple
+            See `friction_parameters`.
+        closed : dict of Structure to array, optional
+            See `ModelState`.
+        has_state : bool
+            Whether the state for the motion is made next from the result.
         """
         if not isinstance(motion, JointMotion):
             return None
