@@ -183,7 +183,7 @@ class Sensitivities:
             columns[NUMBERS] = self._of_numbers(forces, samples)
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
-                np.asarray(self.model.reversal.velocity)))
+                np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
             for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
                 columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
         if self.of_zeros and HOMING not in self.known:
@@ -426,7 +426,7 @@ def following(model: DriveModel) -> list[Effect]:
             and effect.initial_memory() is None]
 
 
-def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array) -> list[Array]:
+def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Array) -> list[Array]:
     """Return what dry friction that turns over otherwise changes, (N, D) each.
 
     Parameters
@@ -435,16 +435,16 @@ def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array
         Its size in full motion [N].
     velocity, direction : (N, D) array
         [m/s], and its sgn as the model has it.
-    width : float or (D,) array
-        Of the model's sgn [m/s].
+    widths : (W,) or (W, D) array
+        Other widths of the sgn [m/s].
 
     Returns
     -------
     list
-        A column for each of `DRIVE_WIDTHS`, odd in the direction; and an even one, for friction
+        A column for each width, odd in the direction; and an even one, for friction
         that differs by direction while it turns over.
     """
-    odd = [dry * (smooth_sign(velocity, factor * width) - direction) for factor in DRIVE_WIDTHS]
+    odd = [dry * (smooth_sign(velocity, width) - direction) for width in widths]
     return [*odd, dry * (1 - np.abs(direction))]
 
 
