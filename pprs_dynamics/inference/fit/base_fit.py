@@ -151,13 +151,13 @@ def require_open_numbers(model: DriveModel) -> None:
 
 
 def halves(recording: Recording) -> list[Recording]:
-    """Return the first and the second half of a recording."""
-    start, end = recording.segments[0].start, recording.segments[-1].stop
-    middle = (start + end) // 2
+    """Return two parts of a recording with as many measured efforts each."""
+    measured = np.flatnonzero(np.isfinite(recording.effort).any(axis=1))
+    end, middle = recording.segments[-1].stop, int(measured[len(measured) // 2])
     return [replace(recording, segments=tuple(
         slice(max(part.start, low), min(part.stop, high)) for part in recording.segments
         if max(part.start, low) < min(part.stop, high)))
-        for low, high in ((start, middle), (middle, end))]
+        for low, high in ((0, middle), (middle, end))]
 
 
 def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str, float]:
