@@ -15,7 +15,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
-    NAMED_BLOCKS,
+    NAMED,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
@@ -179,7 +179,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named: Iterable[str] = NAMED_BLOCKS if is_described(parameters) else ()
+    named: Iterable[str] = NAMED if is_described(parameters) else ()
     blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):
