@@ -55,7 +55,7 @@ setup(
     ],
     python_requires='>=3.11',
     install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'numba>=0.58', 'pandas>=2.1',
-                      'PyYAML>=6'],
+                      'python-dateutil>=2.8', 'PyYAML>=6'],
     extras_require={
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',

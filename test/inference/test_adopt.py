@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pprs_command import pprs
+from single_axis import axis, axis_recording
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -167,12 +168,24 @@ def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     model, recording = synthetic({}, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert not answer.adopted
-    assert 'would push along the motion' in answer.reason
+    assert 'more is taken away than the model has' in answer.reason
     rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
     model, recording = synthetic(rough, **rough, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert answer.adopted, answer.reason
     assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
+
+
+def test_held_out_blocks_are_predicted_with_the_added_effect_alone() -> None:
+    """The other effect of the recording is in no figure: the new model lacks it."""
+    model, robot = axis(), axis({'coulomb_friction': {'force': 6.0},
+                                 'drive_spring': {'stiffness': 60.0, 'position': 0.0}})
+    answer = adopt(model, EffectRequest.of('coulomb_friction', model.drives),
+                   [axis_recording(robot)])
+    assert answer.adopted, answer.reason
+    assert 'drive_spring' in ' '.join(answer.remarks)
+    assert answer.held_out_before == pytest.approx(answer.error_before, rel=0.1)
+    assert answer.held_out_after == pytest.approx(answer.error_after, rel=0.1)
 
 
 def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import calibrations, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
-from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_gain
+from pprs_dynamics.inference.search.held_out import PredictiveGain, hold_out, predictive_gain
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
@@ -44,7 +44,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
@@ -52,8 +51,6 @@ DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
 SURE = 2.0  # standard deviations by which a number must differ from 0
-MOVING = 5.0  # widths of reversal, above which a drive moves
-PUSHES = 0.1  # of the moving time, in which friction may give power back
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 
 
@@ -109,7 +106,7 @@ def adopt(
             found = _with_effect(case, request)
         except (ModelError, EffectRequestError) as error:
             force = False
-            found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
+            found = case.adoption(request, model, 2 * case.residuals(recordings, model), None, (
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
@@ -157,13 +154,13 @@ class _Case:
 
     @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
                   'held out')
-    def objections(self, gain: PredictiveGain | None, errors: Sequence[float], where: str,
+    def objections(self, gain: PredictiveGain, errors: Sequence[float], where: str,
                    unit: str) -> tuple[str, ...]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
 
         Parameters
         ----------
-        gain : PredictiveGain or None
+        gain : PredictiveGain
             Of the model with the effect.
         errors : (before, after)
             Over all drives [N].
@@ -174,8 +171,6 @@ class _Case:
         """
         asked = FURTHER_ERRORS if any(
             isinstance(effect, CatalogueEffect) for effect in self.model.effects) else FIRST_ERRORS
-        if gain is None:
-            return (f'the error on {where} cannot be computed',)
         if gain.confirms(asked):
             return ()
         why = (f'on {listed(gain.losing)} it rises for certain' if gain.losing else
@@ -183,9 +178,9 @@ class _Case:
         return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
-                 residuals: Sequence[Residuals], held_out: Sequence[float],
-                 gain: PredictiveGain | None, objections: tuple[str, ...], **details: Any,
-                 ) -> Adoption:
+                 residuals: Sequence[Residuals],
+                 on_blocks: tuple[float, float, PredictiveGain] | None,
+                 objections: tuple[str, ...], **details: Any) -> Adoption:
         """Return the undecided adoption of a model, with all objections.
 
         Parameters
@@ -194,28 +189,29 @@ class _Case:
         after : DriveModel
         residuals : (before, after)
             On the recordings.
-        held_out : (before, after)
-            Errors on blocks of the recordings [N]; on validation recordings they are computed.
-        gain : PredictiveGain or None
-            On held-out data.
+        on_blocks : (before, after, PredictiveGain) or None
+            Errors on held-out blocks of the recordings [N], and the gain there; unused where
+            there are validation recordings. None where the effect gives no model.
         objections : tuple of str
         details
             Further fields of the adoption.
         """
         before, with_it = residuals
-        errors = [rms(before), rms(with_it)]
+        errors = held_out = [rms(before), rms(with_it)]
         if self.validate:
-            held_out = [rms(each) for each in self.residuals(self.validate, self.model, after)]
-        if after is not self.model:
-            objections += (
-                self.objections(predictive_gain(before, with_it), errors, 'the recordings',
-                                before.unit)
-                or self.objections(gain, held_out, self.held_out, before.unit))
-        first, last = held_out or errors
+            held = self.residuals(self.validate, self.model, after)
+            on_blocks = (rms(held[0]), rms(held[1]), predictive_gain(*held))
+        if on_blocks is not None:
+            *held_out, gain = on_blocks
+            if after is not self.model:
+                objections += (
+                    self.objections(predictive_gain(before, with_it), errors, 'the recordings',
+                                    before.unit)
+                    or self.objections(gain, held_out, self.held_out, before.unit))
         return Adoption(**{
             'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
-            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': first,
-            'held_out_after': last, 'held_out_on': VALIDATION if self.validate else BLOCKS,
+            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': held_out[0],
+            'held_out_after': held_out[1], 'held_out_on': VALIDATION if self.validate else BLOCKS,
             'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
             'reference': () if self.reference is None else self.reference.names, **details})
 
@@ -234,8 +230,9 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     table, name = case.diagnosis.selection, request.name
     assert table is not None
     row = requested_row(table, request)
-    answer = Answer(table, row, case.validate)
-    effect = next(effect for effect in answer.effects if effect.name == name)
+    answer = Answer(table, row, ())
+    candidate = next(c for c in row.effects if c.name == name)
+    effect = answer.found(candidate)
     after, gone = requested_model(answer, request, effect)
     objections = list(_of_table(case, request, table, row, effect))
     if refused := [component.drive for component in row.fits.refused(row.fitted)
@@ -245,8 +242,6 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                           f'{places and f" on {places}"}: beyond its bounds, or more is taken away '
                           'than the model has')
     residuals = case.residuals(case.recordings, case.model, after)
-    if request.effect.is_friction and not gone:
-        objections += _of_friction(effect, after, residuals[-1])
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(table.first.decisions.rival_margin)
         if name in (*rival.missing, *rival.instead)
@@ -260,17 +255,32 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
         remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
                        'were tried')
     if others:
-        remarks.append(f'The recordings also show {listed(others)}' + (
-            '' if case.validate else '; held-out blocks are predicted with all of these'))
+        remarks.append(f'The recordings also show {listed(others)}')
     prefix = f'effects.{name}.'
     return case.adoption(
-        request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
-        tuple(objections), drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
+        request, after, residuals, _on_blocks(case, row, candidate), tuple(objections),
+        drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
         moments=effect.moments, parameters={
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
             answer.fits, answer.fitted) if number.after != number.before))
+
+
+def _on_blocks(case: _Case, row: Row, candidate: EffectCandidate,
+               ) -> tuple[float, float, PredictiveGain] | None:
+    """Return held-out errors without an effect and with it alone, as the model gets it.
+
+    None where validation recordings decide.
+    """
+    table = case.diagnosis.selection
+    if case.validate or table is None:
+        return None
+    if row.fitted.candidates != (candidate,):
+        row = Row.exact(table.first, table.first.evaluate((candidate,)))
+    without, alone = (hold_out(row.fits, fitted) for fitted in (
+        row.fits.at_noise_of(row.fitted, ()), row.fitted))
+    return without.error, alone.error, without.gain(alone)
 
 
 def requested_row(table: ModelTable, request: EffectRequest) -> Row:
@@ -405,28 +415,6 @@ def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
     return (f'the recordings do not support {request.name}: {more} than the model without it',)
 
 
-@outside_cost('adopt refuses friction that pushes along the motion')
-def _of_friction(effect: FoundEffect, model: DriveModel, residuals: Residuals) -> tuple[str, ...]:
-    """Return whether friction of a model would push along the motion, on a drive or in all."""
-    on_drives = [each.name for each in model.effects if each.name == ACTIVE_FRICTION or (
-        isinstance(each, DriveEffect) and each.is_friction)]
-    elsewhere = [each.name for each in model.effects if each.name == PASSIVE_FRICTION or (
-        isinstance(each, StructureEffect) and each.is_friction)]
-    velocity = residuals.variables['velocity']
-    moving = np.abs(velocity) > MOVING * np.asarray(model.reversal.velocity)
-    power = velocity * sum(residuals.parts.get(name, 0.0) for name in (
-        on_drives if effect.drives else [*on_drives, *elsewhere]))
-    for place in effect.drives or ('all drives',):
-        chosen = ([residuals.drives.index(place)] if effect.drives
-                  else range(len(residuals.drives)))
-        moves = moving[:, chosen].any(axis=1)
-        share = float(np.mean(power[moves][:, chosen].sum(axis=1) < 0)) if moves.any() else 0.0
-        if share > PUSHES:
-            return (f'friction on {place} would push along the motion in {share:.0%} of the '
-                    'moving time',)
-    return ()
-
-
 # A measured curve
 
 
@@ -437,11 +425,11 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
     start, _ = measure_residuals(bare, case.recordings)
     fitted = fit_curve(start, request)
     after = with_curve(bare, drive, fitted)
-    if case.validate:
-        given, found = (measure_residuals(each, case.validate)[0] for each in (bare, after))
-    else:
-        given, found = start, held_out_residuals(
+    on_blocks = None
+    if not case.validate:
+        found = held_out_residuals(
             start, request, lambda share: report(DIAGNOSED + (1 - DIAGNOSED) * share))
+        on_blocks = rms(start), rms(found), predictive_gain(start, found)
     count = len(model.drives)
     # Chosen among the curves of every drive over every variable.
     evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))
@@ -456,7 +444,6 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
         remarks.append(f'The recordings also show {others}: adopt causes first, a curve in their '
                        'place is valid for this motion only')
     return case.adoption(
-        request, after, case.residuals(case.recordings, model, after), (rms(given), rms(found)),
-        predictive_gain(given, found), against,
+        request, after, case.residuals(case.recordings, model, after), on_blocks, against,
         parameters=fitted.parameters(drive, start.units_of(drive).effort), curve=fitted,
         remarks=tuple(remarks))

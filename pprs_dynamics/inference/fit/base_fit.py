@@ -107,7 +107,8 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
     Parameters
     ----------
     model : DriveModel
-        Of an arm all inertia and friction is fitted; of the others what `tolerances` leave open.
+        Of an arm, and of a slide without `tolerances`, inertia and friction are fitted; else what
+        `tolerances` leave open.
     recordings : sequence of Recording
         Of free motion.
     validate : sequence of Recording, optional
@@ -144,7 +145,7 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
 
 def require_open_numbers(model: DriveModel) -> None:
     """Raise FitError where a model has nothing that a fit may move."""
-    if not model.is_mechanism and not model_numbers(model):
+    if not model.moves_joints and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
 
@@ -168,7 +169,7 @@ def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str
 
 
 def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
-    if model.is_mechanism:
+    if model.is_mechanism or not model_numbers(model):
         return fit_arm(model, recordings)
     # As in a diagnosis without any effect: the tolerance is the prior, and the width in which
     # friction reverses is free.
