@@ -33,7 +33,7 @@ help:
 	@echo 'make reference  how small a change since a reference run is told, on arms and robots with loops (an hour)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
-	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
+	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests notice (an hour)'
 	@echo 'make workbench   how fast the workbench answers, in a real browser (5 minutes)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
@@ -129,7 +129,7 @@ decisions: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.decisions
 
 mutants: $(VENV)/.test
-	$(BIN)/python -m benchmarks.mutants --json output/mutants.json
+	$(BIN)/python -m benchmarks.mutants
 
 workbench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.workbench 30 docs/images/workbench.png

@@ -55,7 +55,7 @@ setup(
     ],
     python_requires='>=3.11',
     install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'numba>=0.58', 'pandas>=2.1',
-                      'PyYAML>=6'],
+                      'python-dateutil>=2.8', 'PyYAML>=6'],
     extras_require={
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
@@ -79,7 +79,6 @@ setup(
                  'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11',
                  'axe-playwright-python>=0.1.4',  # accessibility of pages
-                 'cosmic-ray>=8.3',  # make mutants
                  'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',

@@ -106,6 +106,8 @@ class RecordedColumns(NamedTuple):
         recordings differ in.
     channels : mapping of str to str or int
         By quantity: a column of the whole machine, for drives that have none of their own.
+    time_fraction : str or int, optional
+        Milliseconds, microseconds or nanoseconds to be added to whole seconds in `time`.
     """
 
     time: Column | None = None
@@ -115,6 +117,7 @@ class RecordedColumns(NamedTuple):
     decimal: str = '.'
     files: Mapping[str, str] = MappingProxyType({})
     channels: Mapping[str, Column] = MappingProxyType({})
+    time_fraction: Column | None = None
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.drive_model import Margins, margins
 from pprs_dynamics.ros.force_command import (
     HOLD_GRAVITY,
+    SHORTEST_STOP,
     SILENT,
     DriveTrajectory,
     Feedforward,
@@ -32,6 +33,7 @@ from pprs_dynamics.ros.messages.conversions import (
     efforts,
     joint_state,
 )
+from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     TRAJECTORY,
@@ -58,7 +60,7 @@ except ImportError:  # then nothing is known of a controller
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
 LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
-STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` is 0
+STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` gives none
 
 
 class FeedforwardNode(ManagedNode):
@@ -125,11 +127,12 @@ class FeedforwardNode(ManagedNode):
         # Raw: message objects of a long trajectory would take longer than the model.
         for topic, reader in self._readers.items():
             self._until_cleanup(self.destroy_subscription, subscription(
-                self, reader.message, topic, partial(self._on_trajectory, reader), raw=True,
+                self, reader.message, topic, partial(self._on_trajectory, reader),
                 profile=SETPOINTS))
         if JointTrajectoryControllerState is not None:
             self._until_cleanup(self.destroy_subscription, subscription(
-                self, JointTrajectoryControllerState, self._controller_topic, self._on_controller))
+                self, JointTrajectoryControllerState, self._controller_topic,
+                only_whole(JointTrajectoryControllerState, self._on_controller)))
 
     def _create_parts(self) -> None:
         known = self._settings.model.knows_currents
@@ -190,8 +193,8 @@ class FeedforwardNode(ManagedNode):
             request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
-            self._lag.append(max(0.0, _since(info['received_timestamp'])
-                              - (time.perf_counter() - began)))
+            waited = _since(info['received_timestamp']) - (time.perf_counter() - began)
+            self._lag.append(max(0.0, waited))
         self._report_condition(answer)
 
     def _command(self, command: ForceCommand) -> None:
@@ -366,7 +369,9 @@ class FeedforwardNode(ManagedNode):
         if left > 0:
             if self._sent.ends_at_rest:
                 return '; a trajectory controller completes its trajectory, which ends at rest'
-            stop_time = self._settings.node_values['stop_time'] or STOP_TIME
+            stop_time = self._settings.node_values['stop_time']
+            if stop_time < SHORTEST_STOP:
+                stop_time = STOP_TIME
             self._sent = self._feedforward.stop(left, stop_time, gravity)
             self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'

@@ -38,6 +38,7 @@ HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
 RAMP_TIME = 2.0  # [s]; a person sees the efforts change and can stop it
 STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
 SAME_EFFORT = 1e-9  # [N, N m]
+SHORTEST_STOP = 1e-3  # [s]; the points of a shorter one would have equal times
 
 FRAME = node_parameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
                        stays=True)
@@ -59,7 +60,7 @@ _PARAMETERS = (
     node_parameter('ramp_time', RAMP_TIME, 'in which efforts change to those of a changed model or '
                    'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
     node_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
-                   'followed by one at rest [s]; 0: none is', lower=0, upper=10),
+                   'followed by one at rest [s]; below 1 ms: none is', lower=0, upper=10),
     node_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
                    'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
     node_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
@@ -306,11 +307,11 @@ class Feedforward:
         answer : ForceCommand
             The last one.
         duration : float
-            [s]; 0: nothing is added.
+            [s]; nothing is added below `SHORTEST_STOP`.
         """
         found = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
         position, velocity, acceleration = found.drive_motion
-        if not duration or not (velocity[-1].any() or acceleration[-1].any()):
+        if duration < SHORTEST_STOP or not (velocity[-1].any() or acceleration[-1].any()):
             return found
         rest = np.zeros_like(velocity[-1:])
         stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, *self._limits.strokes)

@@ -35,12 +35,12 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import PREFIX
 from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.incoming_bytes import message_in
+from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_owner import ModelOwner
 from pprs_dynamics.ros.node.parameters import ACTIVE, overrides, plain_value
-from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
+from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, subscription
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
@@ -84,11 +84,10 @@ class LiveJointStates(Node):
         self._monitor: list[float] | None = None
         self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
-        # Raw, as what is no message of the kind would end the executor.
-        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, MEASURED,
-                                 raw=True)
-        self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED,
-                                 raw=True)
+        subscription(self, Float64MultiArray, f'{monitor}/error',
+                     only_whole(Float64MultiArray, self._on_error), MEASURED)
+        subscription(self, String, f'{monitor}/diagnosis', only_whole(String, self._on_diagnosis),
+                     LATCHED)
         self.owner = ModelOwner(self, feedforward, lambda: self.model, self._follow)
         self.restoring = self.create_client(Trigger, f'{feedforward}/restore')
         steady_timer(self, COMPARED, self._compare)
@@ -101,10 +100,9 @@ class LiveJointStates(Node):
         full_name = name if name.startswith('/') else (
             f'{self.get_namespace().rstrip("/")}/{name}')
         said = [f'node {full_name}']
-        if robot := status.get('robot'):
-            files = ', '.join(Path(each['file']).name
-                              for each in status.get('model', {}).get('files', ()))
-            said.append(f'robot {robot}' + (f' of {files}' if files else ''))
+        if status.robot:
+            said.append(f'robot {status.robot}'
+                        + (f' of {", ".join(status.files)}' if status.files else ''))
         if takers := self._takers(full_name):
             said.append(f'commands go to {", ".join(takers)}')
         return '; '.join(said)
@@ -146,14 +144,13 @@ class LiveJointStates(Node):
     def _reject(self, rejection: Rejection) -> None:
         self._rejected += 1
 
-    def _on_error(self, data: bytes) -> None:
-        with suppress(Rejection):
-            self._monitor = list(message_in(data, Float64MultiArray).data)
-            self._heard = time.monotonic()
+    def _on_error(self, message: Float64MultiArray) -> None:
+        self._monitor = list(message.data)
+        self._heard = time.monotonic()
 
-    def _on_diagnosis(self, data: bytes) -> None:
-        with suppress(Rejection, ValueError):  # no JSON: not of our monitor
-            found = json.loads(message_in(data, String).data, parse_constant=lambda _: None)
+    def _on_diagnosis(self, message: String) -> None:
+        with suppress(ValueError):  # no JSON: not of our monitor
+            found = json.loads(message.data, parse_constant=lambda _: None)
             if isinstance(found, dict):
                 self._diagnosis = found
 
@@ -199,7 +196,7 @@ class LiveJointStates(Node):
         return {'received': self.stream.counters['received'], 'rejected': self._rejected,
                 'drives': list(self.model.drives), 'age': age, 'kept': span,
                 'trouble': trouble, 'diagnosis': self._diagnosis,
-                'can_restore': self.owner.steps > 0,
+                'can_restore': self.owner.status.changes > 0,
                 'effects': list(self.model.values.get(ACTIVE, ())),
                 'error': [finite(value) for value in running],
                 'monitor_error': [finite(value) for value in self._monitor]

@@ -88,7 +88,7 @@ class LiveStream:
     def listen(self) -> None:
         """Subscribe; best effort, which hears reliable publishers as well."""
         self._subscription = subscription(
-            self._node, JointState, self._topic, self._on_state, raw=True, profile=MEASURED)
+            self._node, JointState, self._topic, self._on_state, profile=MEASURED)
 
     def close(self) -> None:
         """Unsubscribe."""

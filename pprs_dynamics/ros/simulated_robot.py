@@ -98,7 +98,7 @@ class SimulatedRobotNode(Node):
         self._states = publisher(self, JointState, 'joint_states')
         for kind, topic, take in ((JointState, '~/joint_command', self._take_setpoint),
                                   (Float64MultiArray, '~/commands', self._take_efforts)):
-            subscription(self, kind, topic, partial(self._on_command, take), raw=True)
+            subscription(self, kind, topic, partial(self._on_command, take))
         self.get_logger().info(
             f'{self._model.title}, {node_values["rate"]:g} Hz, PD loop of '
             f'{node_values["bandwidth"]:g} Hz, hidden effects: {self._injected()}; holding at home')

@@ -33,6 +33,7 @@ from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.force_command import STILL, DriveTrajectory, Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     SPLINE,
@@ -95,7 +96,7 @@ class TrajectoryProxyNode(Node):
         self._speed_scaling = 1.0  # the largest that the controller has reported
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
         subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
-                     self._on_controller)
+                     only_whole(JointTrajectoryControllerState, self._on_controller))
         self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
 
     def _refresh(self) -> None:

@@ -10,9 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from model_recordings import TIME, record
+from single_axis import AXIS, axis_motion
+from single_axis import TIME as SECONDS
 
 from benchmarks.hidden.recordings import Case, make_case
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -218,3 +220,18 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     found = diagnose(MODEL, [recording])
     assert {one.name for one in found.effects} == {'time_delay', 'viscous_friction'}
     assert 'slide_3' not in {drive for one in found.effects for drive in one.drives}
+
+
+@pytest.mark.parametrize('name', ['coulomb_friction', 'load_friction'])
+def test_friction_of_a_slide_has_its_name_though_it_turns_over_more_slowly_than_the_models(
+        name: str) -> None:
+    slide = DriveModel.load('config/single_axis.yaml')
+    motion = axis_motion(SECONDS, 1)
+    v, a = motion.velocity, motion.acceleration
+    direction = v / np.hypot(v, 0.005 * np.abs(v).max())
+    extra = {'coulomb_friction': 15.0, 'load_friction': 0.15 * np.abs(95.0 * a)}[name] * direction
+    noise = np.random.default_rng(1).normal(0, 0.3, v.shape)
+    found = diagnose(slide, [Recording.from_arrays(
+        'run', SECONDS, motion.position, None,
+        slide.drive_forces(motion).total + extra + noise, (AXIS,))])
+    assert (found.verdict, [effect.name for effect in found.effects]) == ('effect', [name])

@@ -141,11 +141,12 @@ def test_friction_that_its_own_heat_takes_away_is_a_drift_by_work(
         assert values(found)['time'] == pytest.approx(cooling, rel=0.5)
 
 
-def test_friction_by_load_is_named_where_the_load_varies() -> None:
-    """A vertical screw that loses 8 % of its load both ways, which varies by 20 %."""
+@pytest.mark.parametrize(('acceleration', 'warns'), [(0.3, True), (3.0, False)])
+def test_friction_by_load_needs_another_load(acceleration: float, warns: bool) -> None:
+    """A vertical screw that loses 8 % of its load both ways, which varies by 2 or 20 %."""
     model = DriveModel.from_parameters(axis_values(20.0, 100.0, 20.0, gravity=-9.81))
     time, w = np.arange(0, 30, 0.01), 2 * np.pi * 0.4 * np.array([1.0, 0.37])
-    phase, size = w * time[:, None], 3.0 / w[0] ** 2
+    phase, size = w * time[:, None], acceleration / w[0] ** 2
     q, v, a = (size * one.sum(axis=1, keepdims=True) for one in (
         np.sin(phase), w * np.cos(phase), -w ** 2 * np.sin(phase)))
     force = model.drive_forces(JointMotion(q, v, a, time)).total
@@ -153,5 +154,6 @@ def test_friction_by_load_is_named_where_the_load_varies() -> None:
     noise = 0.3 * np.random.default_rng(5).normal(size=force.shape)
     found = diagnose(model, [Recording.from_arrays('run', time, q, v, force + noise, ('axis',))])
     assert named(found) == [('load_friction', ('axis',))]
+    assert any('another load' in warning for warning in found.warnings) is warns
     value = found.effects[0].parameters['axis.coefficient']
     assert abs(value.value - 0.08) < 3 * value.std

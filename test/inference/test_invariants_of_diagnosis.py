@@ -12,14 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planar_arm import planar_arm
-from single_axis import AXIS, TIME, Effects, axis, axis_recording
+from single_axis import AXIS, TIME, Effects, axis, axis_motion, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion, compare
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.answer import Answer, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -260,12 +262,18 @@ def test_an_effect_that_raises_the_error_of_held_out_recordings_is_unknown() -> 
     assert found.adopted.values['effects.active'] == []
 
 
-@pytest.mark.parametrize('is_there', [True, False])
-def test_an_effect_that_begins_has_a_time_and_held_out_recordings_count(is_there: bool) -> None:
+@cache
+def diagnosed_half_way(is_there: bool) -> Diagnosis:
+    """Return the diagnosis of friction that begins; a held-out recording has it, or not."""
     begun = axis_recording(DRY, before=axis(), begins=4.0)
     begun = replace(begun, time=begun.time + LATER)
+    return diagnose(axis(), [begun], [recorded('dry' if is_there else 'nothing', 2)])
+
+
+@pytest.mark.parametrize('is_there', [True, False])
+def test_an_effect_that_begins_has_a_time_and_held_out_recordings_count(is_there: bool) -> None:
+    found = diagnosed_half_way(is_there)
     other = recorded('dry' if is_there else 'nothing', 2)
-    found = diagnose(axis(), [begun], [other])
     (effect,) = found.effects if is_there else found.unconfirmed
     assert found.verdict == ('effect' if is_there else 'unknown')
     assert effect.to_dict()['since'] == pytest.approx(4.0, abs=0.1)
@@ -275,6 +283,49 @@ def test_an_effect_that_begins_has_a_time_and_held_out_recordings_count(is_there
     # All the time it is a row as well, which costs more.
     constant = next(row for row in table_of(found).rows if row.effects and not row.fitted.is_dated)
     assert constant.cost > table_of(found).best.cost + DECISIONS.rival_margin
+
+
+@pytest.mark.parametrize('is_there', [True, False])
+def test_no_sentence_asks_for_the_cause_of_an_effect_that_held_out_data_refute(
+    is_there: bool,
+) -> None:
+    words = word_diagnosis(diagnosed_half_way(is_there))
+    asks = [words.headline, words.following, words.command,
+            *(f'{one.title} {one.what} {one.cause}' for one in words.effects)]
+    assert any('coulomb_friction' in each for each in asks) is is_there
+    assert ('what happened to the machine' in words.following) is is_there
+
+
+def of_force(hidden: Effects) -> float:
+    """Return the rms of what effects add to the force along the first motion [N]."""
+    motion = axis_motion(TIME, 1)
+    real, model = (each.drive_forces(motion).total for each in (axis(hidden), axis()))
+    return root_mean_square(real - model)
+
+
+def test_an_effect_is_credited_with_what_its_force_removes_the_largest_first() -> None:
+    found = diagnosed('two', 1)
+    sizes = {name: of_force({name: values}) for name, values in HIDDEN['two'].items()}
+    assert [one.name for one in found.effects] == sorted(sizes, key=lambda name: -sizes[name])
+    for one in found.effects:
+        removed = np.sqrt(one.error_before ** 2 - one.error_after ** 2)
+        assert removed == pytest.approx(sizes[one.name], rel=0.05)
+
+
+def test_what_another_number_of_the_model_removes_is_credited_to_no_effect() -> None:
+    """The mass is 5 % more than in the model file, which says that it is known to 10 %."""
+    dry = {'coulomb_friction': {'force': 0.6}}
+    real = axis(dry, **{'links.mass': (21.0,)})
+    found = diagnose(axis(**{'tolerances.links.mass': 0.1}), [axis_recording(real, 1, NOISE)])
+    effect, = found.effects
+    assert effect.name == 'coulomb_friction'
+    removed = np.sqrt(effect.error_before ** 2 - effect.error_after ** 2)
+    assert removed == pytest.approx(of_force(dry), rel=0.05)
+    refit = found.to_dict()['refit']
+    assert refit['error_after'] == pytest.approx(effect.error_before, rel=1e-3)
+    heavier = of_force({'drive_inertia': {'mass': 1.0}})
+    assert refit['error_before'] ** 2 - refit['error_after'] ** 2 == pytest.approx(
+        heavier ** 2, rel=0.1)
 
 
 @pytest.mark.parametrize('name', ['nothing', 'spring', 'dry', 'two'])

@@ -8,16 +8,18 @@ Motion and efforts come from equations of their own, not from the package.
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_up_files import ARM, arm_efforts, drawn, motion
 
-from pprs_dynamics.app.api.first_model import first_model
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.app.api.first_model import FirstModel, first_model
+from pprs_dynamics.errors import MotionError, PprsError
+from pprs_dynamics.inference.readings.columns import GuessError
 from pprs_dynamics.measurement.files.bag_files import write_bag
-from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.samples import Samples
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
@@ -92,6 +94,13 @@ TITLES = {  # of a quantity: its columns, and their multiple of SI
     'both sides of a gear': {'x': ('motor_pos_{}', 100.0), 'q': ('joint_pos_{}', 1.0),
                              'tau': ('joint_torque_{}', 1.0)},
     'measured': {'q': ('qm{}', 1.0), 'v': ('qdm{}', 1.0), 'tau': ('taum{}', 1.0)},
+    'feedback': {'x': ('tau_ff_{}', 1.0), 'q': ('fb_pos_{}', 1.0), 'tau': ('fb_eff_{}', 1.0)},
+    'joined': {'x': ('jcmd{}', 1.0), 'q': ('jpos{}', 1.0), 'v': ('jvel{}', 1.0),
+               'tau': ('jtrq{}', 1.0)},
+    'compounds': {'q': ('Gelenkwinkel {}', 1.0), 'tau': ('Gelenkmoment {}', 1.0)},
+    'compounds with roles': {'x': ('Lagesollwert {}', 1.0), 'q': ('Lageistwert {}', 1.0),
+                             'v': ('Drehzahlistwert {}', 1.0), 'tau': ('Momentenistwert {}', 1.0)},
+    'blanks and quotes': {'q': (' "q {}"', 1.0), 'tau': (' "tau {}"', 1.0)},
 }
 
 
@@ -170,3 +179,111 @@ def test_velocities_contradict_the_unit_of_times(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('t [s]', 't [ms]'))
     first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
     assert any('time_scale: 1' in question for question in first.questions)
+
+
+def run_of_arm(size: float = 1.0, middle: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Return time, positions, velocities and efforts."""
+    random = np.random.default_rng(5)
+    time, q, v, a = motion(random, 2, size)
+    q = q + middle
+    return time, q, v, arm_efforts(q, v, a) + random.normal(0, 0.03, q.shape)
+
+
+def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Recording:
+    """Write a table, and return it as a first model reads it, without a question."""
+    first = asked_about(folder, head, *columns, separator=separator)
+    assert not first.questions
+    return read_recording(folder / 'run.csv', first.model.recorded)
+
+
+def asked_about(folder: Path, head: str, *columns: np.ndarray, separator: str = ',') -> FirstModel:
+    """Write a table, and return the first model for it."""
+    cells = [column for each in columns for column in (
+        each.T if each.ndim == 2 else [each])]
+    lines = [separator.join(cell if isinstance(cell, str) else f'{cell:.10g}' for cell in row)
+             for row in zip(*cells, strict=True)]
+    (folder / 'run.csv').write_text('\n'.join([head] * bool(head) + lines))
+    (folder / 'robot.urdf').write_text(ARM)
+    return first_model(folder / 'robot.urdf', [folder / 'run.csv'], folder / 'robot.yaml')
+
+
+@pytest.mark.parametrize('head', ['t,q1,q2,tau1,tau2', ''])
+@pytest.mark.parametrize(('unit', 'lowest'), [
+    (1.0, -np.pi), (1.0, 0.0), (np.pi / 180, 0.0), (np.pi / 180, -np.pi), (2 * np.pi, 0.0),
+    (np.pi / 2048, 0.0)])
+def test_angles_that_begin_again_each_turn_run_on(unit: float, lowest: float, head: str,
+                                                  tmp_path: Path) -> None:
+    time, q, v, effort = run_of_arm(2.2, lowest)
+    recorded = ((q - lowest) % (2 * np.pi) + lowest) / unit
+    assert np.abs(np.diff(recorded, axis=0)).max() * unit > 6
+    counts = np.round(recorded) if unit == np.pi / 2048 else recorded
+    found = read_table(tmp_path, head.replace('tau1', 'dq1,dq2,tau1'), time, counts, v / unit,
+                       effort)
+    turns = (found.position - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=2e-4)
+    assert len(found.segments) == 1
+    np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+
+
+@pytest.mark.parametrize('head', ['sec,nanosec', 'field.header.stamp.secs,field.header.stamp.nsecs',
+                                  'tv_sec,tv_usec', ''])
+def test_seconds_and_their_fractions_may_be_columns_each(head: str, tmp_path: Path) -> None:
+    time, q, v, effort = run_of_arm()
+    whole, fraction = np.divmod(np.round((time + 0.37) * 1e6), 1e6)
+    unit = 1 if 'usec' in head else 1000
+    found = read_table(tmp_path, head and f'{head},q1,q2,dq1,dq2,tau1,tau2',
+                       1_700_000_000 + whole, unit * fraction, q, v, effort)
+    np.testing.assert_allclose(found.time - found.time[0], time, atol=1e-6)
+    np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+
+
+@pytest.mark.parametrize('form', [
+    '%d.%m.%Y %H:%M:%S.%f', '%d.%m.%y %H:%M:%S,%f', '%Y-%m-%dT%H:%M:%S.%fZ', '%H:%M:%S.%f',
+    '%m/%d/%Y %I:%M:%S.%f %p', '%d.%m.%Y;%H:%M:%S.%f'])
+@pytest.mark.parametrize('title', ['Zeitstempel', ''])
+def test_times_may_be_dates(form: str, title: str, tmp_path: Path) -> None:
+    time, q, _, effort = run_of_arm()
+    start = datetime(2026, 2, 13, 9, 59, 58)
+    dates = np.array([(start + timedelta(seconds=each)).strftime(form) for each in time.tolist()])
+    head = title and f'{"Datum;" * form.count(";")}{title};q1;q2;tau1;tau2'
+    found = read_table(tmp_path, head, dates, q, effort, separator=';')
+    np.testing.assert_allclose(found.time - found.time[0], time, atol=1e-6)
+    np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+
+
+@pytest.mark.parametrize(('head', 'columns'), [
+    ('', 'q0 q1 e0'), ('', 'q0 q1 v0 v1 e1'), ('', 'q0 q1 v0 v1 e0 t'), ('', 'q0 e0'),
+    ('t,q1,q2,tau', 'q0 q1 e0'), ('t,q,tau', 'q0 e0')])
+def test_one_effort_of_two_joints_is_a_question(head: str, columns: str, tmp_path: Path) -> None:
+    time, q, v, effort = run_of_arm()
+    known = {'q': q, 'v': v, 'e': effort, 't': 31 + 0.01 * time[:, None]}
+    values = [known[name[0]][:, int(name[1:] or 0)] for name in columns.split()]
+    try:
+        lines = asked_about(tmp_path, head, time, *values).questions
+    except GuessError as error:
+        lines = (str(error),)
+    assert 'position: 2, ' in ''.join(lines) or '{position: q' in ''.join(lines)
+
+
+@pytest.mark.parametrize(('head', 'unit'), [
+    ('t,q1 [deg],q2 [deg],tau1 [%],tau2 [%]', (1.0, 1.0)),
+    ('t,q1 [deg],q2 [deg],tau1_permille,tau2_permille', (0.1, 0.1)), ('', (0.6, 0.3)),
+    ('', (2.5, 0.9)), ('', (0.6, 0.6))])
+def test_efforts_in_shares_of_an_unknown_one_are_a_question(
+    head: str, unit: tuple[float, float], tmp_path: Path,
+) -> None:
+    time, q, _, effort = run_of_arm()
+    first = asked_about(tmp_path, head, time, np.rad2deg(q), effort / unit)
+    assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain'))
+
+
+def test_a_recording_that_cannot_be_checked_is_a_question(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*_: object) -> None:
+        raise MotionError('recording', 'it fails', 'not fail', 'shape')
+
+    monkeypatch.setattr('pprs_dynamics.app.api.first_model.find_mistakes', fails)
+    time, q, _, effort = run_of_arm()
+    assert 'it fails' in ''.join(asked_about(
+        tmp_path, 't,q1,q2,tau1,tau2', time, q, effort).questions)

@@ -235,6 +235,37 @@ def test_files_with_times_of_their_own_are_held_at_those_of_the_positions(tmp_pa
         read(tmp_path, keys)
 
 
+NAMES = ['t', 'q0', 'q1', 'q2', 'tau0', 'tau1', 'tau2']  # of the columns of WHOLE
+
+
+@pytest.mark.parametrize('twice', NAMES)
+@pytest.mark.parametrize('suffix', ['.csv', '.parquet'])
+def test_a_name_of_two_columns_is_asked_about(twice: str, suffix: str, tmp_path: Path) -> None:
+    path, place = tmp_path / f'run{suffix}', NAMES.index(twice)
+    both = np.column_stack([WHOLE[:, :place], 2 * WHOLE[:, place], WHOLE[:, place:]])
+    names = [*NAMES[:place], twice, *NAMES[place:]]
+    if suffix == '.csv':
+        path.write_text(text(both, header=','.join(names) + '\n'))
+    else:
+        pyarrow, parquet = map(pytest.importorskip, ('pyarrow', 'pyarrow.parquet'))
+        parquet.write_table(pyarrow.Table.from_arrays(
+            [pyarrow.array(column) for column in both.T], names), path)
+    with pytest.raises(UnreadableFileError, match=f"2 columns have the name '{twice}'"):
+        read(path, NAMED)
+    if suffix == '.csv':  # with the number of the right one, as the sentence says
+        keys = {key: place + 2 if name == twice else name for key, name in NAMED.items()}
+        assert_read(read(path, keys))
+
+
+def test_a_name_of_two_columns_in_a_file_of_times_is_asked_about(tmp_path: Path) -> None:
+    folder = written_apart(tmp_path)
+    (folder / 't.csv').write_text(text(np.column_stack([TIME, 2 * TIME]), header='t,t\n'))
+    keys = {'time': 't', 'files.time': 't.csv', 'files.position': 'q.csv',
+            **{f'{joint}.position': k + 1 for k, joint in enumerate(JOINTS)}}
+    with pytest.raises(UnreadableFileError, match="2 columns have the name 't'"):
+        read(folder, keys)
+
+
 @pytest.mark.parametrize('suffix', ['.gz', '.zst'])
 def test_packed_tables_are_unpacked(suffix: str, tmp_path: Path) -> None:
     from rosbags.rosbag2.reader import zstd

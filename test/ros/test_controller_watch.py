@@ -143,3 +143,18 @@ def test_one_that_goes_another_way_is_told_by_how_far_it_is_off_over_the_way(
 ) -> None:
     cell = Cell()
     assert bool(cell.run(3.0, lambda t: scale * cell.path(t))[-1]) == is_told
+
+
+@pytest.mark.parametrize('strange', [np.nan, np.inf, -1e300])
+def test_a_reference_that_is_no_position_or_velocity_is_never_held(strange: float) -> None:
+    cell = Cell()
+    cell.run(1.5, lambda t: cell.path(t))
+    cell.watch.require_hold()
+    cell.run(1.0, lambda t: (0.1, strange), sends=False)
+    assert cell.watch.take_hold() is None
+    for _ in range(2):
+        cell.watch.heard(state((0.1, 0.2), JOINTS, efforts=True, velocity=(0.0, strange)), True)
+    assert cell.watch.take_hold() is None
+    for _ in range(2):
+        cell.watch.heard(state((0.1, 0.2), JOINTS, efforts=True, velocity=(0.0, 0.0)), True)
+    np.testing.assert_array_equal(cell.watch.take_hold(), (0.1, 0.2))

@@ -82,15 +82,21 @@ def test_an_effort_that_is_not_a_number_is_no_measurement(monitor: MonitorBench)
     assert np.isfinite([message.effort for message in monitor.model_effort]).all()
 
 
+def status_of(sha256: str) -> str:
+    """Return what a node that drives says of itself and its model."""
+    return json.dumps({
+        'robot': '3-PPRS', 'model': {'files': [], 'sha256': sha256}, 'changes': 0})
+
+
 def test_a_feedforward_of_another_model_is_told(monitor: MonitorBench) -> None:
     publisher = monitor.bench.probe.create_publisher(String, '/feedforward/status', LATCHED)
     own = DriveModel.load().fingerprint
     for sha256, code in (('0' * 64, 'MODEL'), (own, 'OK')):
-        publisher.publish(String(data=json.dumps({'model': {'sha256': sha256}})))
+        publisher.publish(String(data=status_of(sha256)))
         monitor.bench.spin_for(0.3)
         monitor.send(400)
         assert monitor.bench.status[-1]['code'] == code
-    publisher.publish(String(data=json.dumps({'model': {'sha256': '0' * 64}})))
+    publisher.publish(String(data=status_of('0' * 64)))
     monitor.send(300)
     assert f'sha256 {12 * "0"}, not {own[:12]}' in monitor.bench.status[-1]['message']
     monitor.bench.probe.destroy_publisher(publisher)  # nothing drives any more

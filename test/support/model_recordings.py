@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -20,13 +21,14 @@ EXCITATION = Excitation()
 
 
 def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
-           motion: Callable[[np.ndarray], PlatformMotion] = EXCITATION.motion) -> Recording:
+           motion: Callable[[np.ndarray], PlatformMotion] = EXCITATION.motion,
+           time: Array = TIME) -> Recording:
     """Return a recording of what a model says about a motion of times [s]."""
-    forces = model.drive_forces(motion(TIME).with_time(TIME))
+    forces = model.drive_forces(motion(time).with_time(time))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
     return Recording.from_arrays(
-        'made', TIME, forces.mechanism.position
+        'made', time, forces.mechanism.position
         + model.position_error(forces.mechanism.position),
         effort=said.total + noise * rng.normal(size=said.total.shape))
 

@@ -34,6 +34,7 @@ class Bench:
         self.probe = Node('probe', context=context)
         self.executor.add_node(self.probe)
         self.subscriptions: list[Any] = []
+        self._status_topics: list[str] = []
         self.status: list[dict[str, Any]] = []
 
     def add(self, factory: Callable[..., Node], **options: Any) -> Node:
@@ -53,12 +54,17 @@ class Bench:
         """Spin until every topic listened to has its publisher, on both sides."""
         found = self.spin_until(
             lambda: all(each.get_publisher_count() for each in self.subscriptions), 20)
-        # Discovery is one-sided: a publisher may see us a moment after we see it.
+        # Discovery is one-sided: a publisher may see us a moment after we see it. Subscriptions
+        # are announced in order, so a node that answers the latest one knows all the others.
+        for topic in self._status_topics:
+            answers = self.listen(String, topic, LATCHED)
+            found = found and self.spin_until(lambda answers=answers: answers, 20)
         self.spin_for(0.5)
         return found
 
     def follow_status(self, topic: str) -> None:
         """Keep every status of a node, decoded and as its schema says, in `status`."""
+        self._status_topics.append(topic)
         self.probe.create_subscription(
             String, topic, lambda message: self.status.append(checked(message.data)),
             LATCHED)

@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
-from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.check import find_mistakes, unlike_masses
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
     Guess,
@@ -29,13 +29,14 @@ from pprs_dynamics.inference.readings.table import (
     CURRENT,
     EFFORT,
     POSITION,
+    SHARE,
     VELOCITY,
     WORDS,
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
-from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 from pprs_dynamics.measurement.files.way_out import common_prefix
 from pprs_dynamics.physics.mechanism.branches import (
@@ -275,16 +276,21 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
     notes: list[str] = []
     corrected: set[str] = set()
     while True:
+        model = draft.model
         try:
-            mistakes = find_mistakes(draft.model, read_recording(path, draft.model.recorded))
-        except PprsError:
-            return notes
+            recording = read_recording(path, model.recorded)
+            mistakes = find_mistakes(model, recording)
+        except PprsError as error:
+            draft.questions.append(f'it was not checked how {path.name} is read: {error}')
+            return notes + draft.questions
         readings = [each for each in mistakes if isinstance(each, OtherReading)]
         sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
         if not sure:
-            draft.questions = [
+            draft.questions += [
                 each.what + (f': if so, write {line}' if line else '') for each in readings
                 for line in [each.line or columns_line([each])]]
+            if not any(each.kind.startswith(('effort', 'drive_constant')) for each in readings):
+                draft.questions += _unit_questions(draft, model, recording)
             return notes + draft.questions
         for each in sure:
             corrected.add(each.kind)
@@ -292,6 +298,27 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
             notes.append(each.what)
             for drive, key, value in each.scales:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
+
+
+def _unit_questions(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
+    """Return questions about efforts whose unit a file does not say: shares, and numbers alone."""
+    efforts = {drive: column for drive in draft.drives
+               if (column := draft.columns.get(drive, {}).get(EFFORT)) is not None}
+    shares = [drive for drive, column in efforts.items() if isinstance(column, str)
+              and f'<{SHARE}>' in words_of(column)]
+    if shares:
+        return [f'{efforts[shares[0]]} is a share of a torque or force that the file does not '
+                'name: write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
+                f'columns: {{{shares[0]}: {{effort_scale: 0.3}}}}']
+    factors = unlike_masses(model, recording) if any(
+        isinstance(column, int) for column in efforts.values()) else {}
+    scales = ', '.join(f'{drive}: {{effort_scale: {1 / factor:.3g}}}'
+                       for drive, factor in factors.items())
+    listed = ', '.join(f'{factor:.3g} ({drive})' for drive, factor in factors.items())
+    return [f'the unit of the efforts is not known, and they are another multiple of what the '
+            f'masses need: {listed}. If they are percent or another unit, write its factor as '
+            f'effort_scale, about columns: {{{scales}}}; if they are N m or N, go on'
+            ] if factors else []
 
 
 # ------------------------------------------------------------------------------ description
@@ -480,6 +507,8 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
             raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
                                   'samples per second')
         found['rate'] = guess.rate
+    if guess.time_fraction is not None:
+        found['time_fraction'] = guess.time_fraction
     if guess.time_scale is not None:
         found['time_scale'] = guess.time_scale
     if contents.decimal != '.':

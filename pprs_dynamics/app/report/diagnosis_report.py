@@ -132,8 +132,9 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
     if diagnosis.sets:
         yield ('The best sets of effects, and their costs above the best',
                'A cost of 10 is odds of 150 to 1. Terms: fit = misfit; coefficients = prior; '
-               'others = model choices.', (('cost', 'set', 'terms'),
-               [(cost, text, why) for text, cost, why in set_rows(diagnosis)]))
+               'others = model choices.',
+               (('cost', 'set', 'terms'),
+                [(cost, text, why) for text, cost, why in set_rows(diagnosis)]))
     if diagnosis.candidates:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),

@@ -33,7 +33,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.decisions import outside_cost
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
     averaged,
@@ -179,31 +179,10 @@ class Answer:
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
-            gain, self._objection(less / max(with_force, 1e-300), gain),
+            gain, objection(less / max(with_force, 1e-300), gain, self.decisions),
             self._ranked(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
-
-    def _objection(self, ratio: float, gain: PredictiveGain | None) -> str:
-        """Return why data refute an effect of the row, as a clause; '' where they do not.
-
-        Parameters
-        ----------
-        ratio : float
-            Of the error without its force and with it.
-        gain : PredictiveGain or None
-            Of held-out data; None where it is not known.
-        """
-        if ratio < 1 - self.decisions.error_rise:
-            return f'without its force the error is {1 - ratio:.0%} smaller'
-        if gain is None or not np.isfinite(gain.certainty):
-            return 'held-out data cannot confirm it'
-        if gain.certainty < -self.decisions.sure:
-            return (f'held-out data are predicted worse with it, by {-gain.certainty:.2g} standard '
-                    'errors')
-        if gain.losing and gain.certainty < self.decisions.sure:
-            return f'held-out data of {listed(gain.losing)} are predicted worse with it'
-        return ''
 
     def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
         """Return held-out errors without and with an effect, and its gain where it is known."""
@@ -344,6 +323,29 @@ class Answer:
             found.setdefault(frozenset(candidate.name for candidate in fitted.candidates),
                              self._ranked(fitted, fitted.terms))
         return tuple(found.values())[:MOST_BARRED]
+
+
+def objection(ratio: float, gain: PredictiveGain | None, decisions: Decisions) -> str:
+    """Return why data refute an effect of the row, as a clause; '' where they do not.
+
+    Parameters
+    ----------
+    ratio : float
+        Of the error without its force and with it.
+    gain : PredictiveGain or None
+        Of held-out data; None where it is not known.
+    decisions : Decisions
+    """
+    if ratio < 1 - decisions.error_rise:
+        return f'without its force the error is {1 - ratio:.0%} smaller'
+    if gain is None or not np.isfinite(gain.certainty):
+        return 'held-out data cannot confirm it'
+    if gain.certainty < -decisions.sure:
+        return (f'held-out data are predicted worse with it, by {-gain.certainty:.2g} standard '
+                'errors')
+    if gain.losing and gain.certainty < decisions.sure:
+        return f'held-out data of {listed(gain.losing)} are predicted worse with it'
+    return ''
 
 
 def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:

@@ -141,6 +141,17 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     return tuple(mistakes)
 
 
+def unlike_masses(model: DriveModel, recording: Recording) -> dict[str, float]:
+    """Return the factors of drives whose efforts are certainly another multiple of the masses'."""
+    excerpt = excerpt_of(recording, table.STRETCHES)
+    evidence = None if excerpt is None else Evidence.of(model, excerpt, plain(len(model.drives)))
+    factors = {} if evidence is None else {
+        drive: evidence.factor(d, d) for d, drive in enumerate(model.drives)
+        if evidence.is_measured(d, d)}
+    return {drive: factor for drive, factor in factors.items()
+            if abs(np.log(abs(factor))) > np.log(table.OTHER_UNIT)}
+
+
 class Search:
     """The search for a reading that is more likely than the plain one.
 
@@ -506,7 +517,8 @@ def _constants(model: DriveModel, factors: Array) -> OtherReading:
     return OtherReading.of(
         'drive_constant', model.drives, every, f'the effort of {named(model.drives, every)} is '
         f'another multiple of what the masses need: {listed}: it looks like currents in amperes, '
-        'or another unit', f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
+        'percent of a torque, or another unit',
+        f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
 
 
 def _unit(model: DriveModel, group: Sequence[int], scales: Array) -> OtherReading:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,10 +17,29 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
+from pprs_dynamics.measurement.files.recording import (
+    MOST_OF_TURN,
+    TURN_ROUNDING,
+    unwrapped,
+)
 from pprs_dynamics.measurement.files.samples import Series
-from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.table_files import (
+    TIME_COLUMNS,
+    TIME_LIKE,
+    fraction_of_seconds,
+)
+from pprs_dynamics.system.plain_yaml import scalar
 
+Columns = dict[tuple[str, str], Column]
 TIME_WORDS = {'time', *TIME_LIKE}
+QUANTITIES = {word for words in table.WORDS.values() for word in words}
+KNOWN = QUANTITIES | table.OTHERS
+ROLE = '(ist|soll|act|cmd|meas|fbk|des|ref)'
+# Words that another may precede in one: Gelenkmoment, but not timestamp nor payload.
+LONG, LONGER = ('|'.join(sorted((word for word in QUANTITIES if len(word) >= least), reverse=True))
+                for least in (3, 5))
+COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG})(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
+                      f'|([a-z]{{3,}})({LONGER})(?:e?[ns])?(?:{ROLE}(?:wert)?)?')
 
 
 class GuessError(PprsError, ValueError):
@@ -32,19 +52,24 @@ class AmbiguousColumns(GuessError):
     Parameters
     ----------
     joints : sequence of str
-    readings : sequence of mapping of str to list of int
-        Places of columns by quantity.
-    series : sequence of Series
+    readings : sequence of mapping of (joint, quantity) to str or int
+        Columns; of no joint, times.
+    what : str
+        Why it is a question, as a clause.
     """
 
-    def __init__(self, joints: Sequence[str], readings: Sequence[Mapping[str, Sequence[int]]],
-                 series: Sequence[Series]) -> None:
-        self.lines = tuple(', '.join(
-            f'{joint}: {{' + ', '.join(f'{kind}: {series[places[k]].column}'
-                                       for kind, places in reading.items()) + '}'
-            for k, joint in enumerate(joints)) for reading in readings)
-        super().__init__('two readings of the columns are as likely, write one of them: '
+    def __init__(self, joints: Sequence[str], readings: Sequence[Columns], what: str) -> None:
+        self.lines = tuple(_line(joints, reading) for reading in readings)
+        super().__init__(f'{what}, write one of them: '
                          + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
+
+
+def _line(joints: Sequence[str], reading: Columns) -> str:
+    """Return what is below `columns` of a model file."""
+    entries = {joint: ', '.join(f'{key}: {scalar(column)}' for (of, key), column in reading.items()
+                                if of == joint) for joint in ('', *joints)}
+    return ', '.join(f'{scalar(joint)}: {{{entry}}}' if joint else entry
+                     for joint, entry in entries.items() if entry)
 
 
 @dataclass(frozen=True)
@@ -64,15 +89,18 @@ class Guess:
         Samples per second of a table without times [Hz].
     effort_kind : str
         By their names, where it is neither measured nor current; else empty.
+    time_fraction : str or int, optional
+        Parts of the seconds in `time`.
     """
 
     time: Column | None
-    columns: dict[tuple[str, str], Column]
+    columns: Columns
     scales: dict[tuple[str, str], float] = field(default_factory=dict)
     time_scale: float | None = None
     notes: list[str] = field(default_factory=list)
     rate: float | None = None
     effort_kind: str = ''
+    time_fraction: Column | None = None
 
 
 def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
@@ -97,23 +125,30 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     GuessError
         Where positions of the joints cannot be found, or two readings are as likely.
     """
-    time, time_scale, notes = _time(series, rate is not None)
-    left = [one for one in series if time is None or one.column != time.column]
+    time, fraction, time_scale, notes = _time(series, rate is not None)
+    left = [one for one in series if time is None or one.column not in (time.column, fraction)]
     # pandas numbers rows in a column without a title, as other programs do.
     left = [one for one in left if one.title or not _rises(one.values)
             or not _counts_rows(one.values)]
     if not left:
         raise GuessError('no column holds numbers beside times')
+    stamp: Columns = {('', key): column for key, column in (
+        ('time', None if time is None else time.column), ('time_fraction', fraction))
+        if column is not None}
     titled = [one for one in left if one.title]
     if titled:
         columns, found = _by_names(titled, joints, quantity, others)
     else:
         count = max((len(each.values) for each in left), default=0)
         stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
-        columns, found = _by_numbers(left, joints, stamps, quantity, notes), []
+        columns, found = _by_numbers(left, joints, stamps, quantity, stamp, notes), []
     notes += found
     main = quantity or POSITION
     known = [joint for joint in joints if (joint, main) in columns]
+    if known and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
+        _ask_for_one(joints, stamp | columns, [each.column for each in titled if each.column not in
+                                       columns.values() and _fit(tuple(words_of(each.title)), {
+                                           '': each.column}, EFFORT, None)[0] > 0])
     if not known:
         raise GuessError(
             f'no columns of {main}s are told by their names: {_listed(left)}; write them '
@@ -121,13 +156,20 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
+    without_unit = [key for key, column in columns.items() if key[1] == POSITION
+                    and unit_of(by_column[column].title) is None]
+    turn = min((turn_of(by_column[columns[key]].values) for key in without_unit), default=np.inf)
+    if turn < np.inf:
+        notes.append(f'positions begin again after {turn:.6g}: taken as a turn')
+        # Encoders of a robot's joints count alike.
+        scales.update(dict.fromkeys(without_unit, 2 * np.pi / turn) if turn != 2 * np.pi else {})
     outside = [column for (_, kind), column in columns.items() if kind == EFFORT
                and {*words_of(by_column[column].title)} & table.FROM_OUTSIDE]
     if outside:
         notes.append(f'{by_column[outside[0]].title} is an external torque by its name, from which '
                      'a model was taken out')
     guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
-                  table.EXTERNAL if outside else '')
+                  table.EXTERNAL if outside else '', fraction)
     return guess if quantity else _judge_velocities(guess, by_column, time)
 
 
@@ -170,15 +212,18 @@ def _words(text: str) -> list[str]:
 
 
 def _split(word: str) -> list[str]:
-    """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
-    known = {each for words in table.WORDS.values() for each in words}
-    for prefix in ('ist', 'soll'):  # Istposition
-        if word.startswith(prefix) and word.removeprefix(prefix) in known:
-            return [prefix, word.removeprefix(prefix)]
-    if word[:-1] in known and (len(word) > 3 or word[0] in 'qd') and word not in (
-            known | table.OTHERS) and word[-1] in table.LETTERS:
+    """Return the parts of a word that is several in one: posa, taum, Istposition, Gelenkwinkel.
+
+    The last letter of a quantity says actual or desired. A German or joined word ends in a
+    quantity, perhaps followed by ist or soll.
+    """
+    if word in KNOWN or not word.isalpha():
+        return [word]
+    if word[:-1] in QUANTITIES and (len(word) > 3 or word[0] in 'qd') and (
+            word[-1] in table.LETTERS):
         return [word[:-1], table.LETTERS[word[-1]]]
-    return [word]
+    compound = COMPOUND.fullmatch(word)
+    return [part for part in compound.groups() if part] if compound else [word]
 
 
 def _listed(series: Sequence[Series]) -> str:
@@ -193,11 +238,16 @@ def _first(series: Sequence[Series]) -> str:
 
 
 def _time(series: Sequence[Series], has_rate: bool,
-          ) -> tuple[Series | None, float | None, list[str]]:
-    """Return the column of times, its unit [s] where it is not seconds, and comments."""
+          ) -> tuple[Series | None, Column | None, float | None, list[str]]:
+    """Return the times, a column of their fractions, their unit if not [s], and comments."""
     rising = [each for each in series if _rises(each.values)]
-    named = [each for each in rising if each.title in TIME_COLUMNS] or [
-        each for each in rising if _is_time(words_of(each.title))]
+    ours = [each for each in rising if each.title in TIME_COLUMNS]
+    for whole, part in () if ours else pairwise(series):
+        if _counts_parts(whole.values, part.values):
+            return replace(whole, values=whole.values + fraction_of_seconds(part.values)), (
+                part.column), None, [f'column {part.column} has the fractions of the seconds in '
+                                     f'column {whole.column}']
+    named = ours or [each for each in rising if _is_time(words_of(each.title))]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
@@ -206,7 +256,7 @@ def _time(series: Sequence[Series], has_rate: bool,
             each for each in rising if _is_even(each.values)
             and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
         if not even:
-            return None, None, notes
+            return None, None, None, notes
         # A counter of rows may come first.
         found = even[len(even) > 1 and _counts_rows(even[0].values)]
         notes.append(f'column {found.column} rises all the time: taken as time')
@@ -215,7 +265,18 @@ def _time(series: Sequence[Series], has_rate: bool,
     if scale is None and step > table.SLOWEST:
         scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
-    return replace(found, values=found.values * (scale or 1.0)), scale, notes
+    return replace(found, values=found.values * (scale or 1.0)), None, scale, notes
+
+
+def _counts_parts(whole: Array, part: Array) -> bool:
+    """Return whether numbers are whole parts of seconds: they fall whenever those rise."""
+    both = np.column_stack([whole, part])
+    steps = np.diff(both[np.isfinite(both).all(axis=1)], axis=0)
+    rises = steps[:, 0] > 0
+    return bool(np.any(rises) and np.all(both[np.isfinite(both)] % 1 == 0)
+                and np.all(steps[:, 0] >= 0) and np.nanmin(part) >= 0 and np.nanmax(part) < 1e9
+                and np.mean(rises == (steps[:, 1] < 0)) > 0.99
+                and _rises(whole + fraction_of_seconds(part)))
 
 
 def _is_time(words: Sequence[str]) -> bool:
@@ -242,7 +303,7 @@ def _counts_rows(values: Array) -> bool:
 
 
 def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | None,
-              others: Collection[str]) -> tuple[dict[tuple[str, str], Column], list[str]]:
+              others: Collection[str]) -> tuple[Columns, list[str]]:
     groups: dict[tuple[str, ...], dict[str, Column]] = {}
     unnamed = []
     for one in series:
@@ -265,7 +326,7 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     if len(joints) == 1:
         for one in series:
             groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
-    columns: dict[tuple[str, str], Column] = {}
+    columns: Columns = {}
     currents_are_measured = False
     wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
     for each in wanted:
@@ -399,7 +460,7 @@ class Links:
         """
         known = np.isfinite(values).all(axis=1) & np.isfinite(time)
         known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
-        values, time = values[known], time[known]
+        values, time = running_on(values[known]), time[known]
         count = values.shape[1]
         best = [np.full((count, count), np.nan) for _ in range(3)]
         if len(time) < table.LEAST_ROWS:
@@ -424,8 +485,22 @@ class Links:
         return cls(*best)
 
 
+def turn_of(values: Array) -> float:
+    """Return after how much the angles of a column, (N,), begin again; infinite if they do not."""
+    known = values[np.isfinite(values)]
+    span, step = np.ptp(known), np.abs(np.diff(known)).max(initial=0.0)
+    return next((turn for unit in (1.0, *table.ANGLES, *table.COUNTS)
+                 if table.NEARLY < span / (turn := 2 * np.pi / unit) <= 1 + TURN_ROUNDING
+                 and step > MOST_OF_TURN * turn), np.inf)
+
+
+def running_on(values: Array) -> Array:
+    """Return columns, (N, M), of which angles run on that begin again after a turn."""
+    return unwrapped(values, [turn_of(column) for column in values.T])[0]
+
+
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
-                quantity: str | None, notes: list[str]) -> dict[tuple[str, str], Column]:
+                quantity: str | None, stamp: Columns, notes: list[str]) -> Columns:
     """Return columns without names by what they are of each other, in any order."""
     count = len(joints)
     if quantity:
@@ -447,9 +522,24 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
                 key=lambda kinds: _roughness(values[:, kinds[POSITION]]))
     efforts = [group for _, other, group in near if other is kinds]
     unlike = next((group for group in efforts if not _are_alike(values, efforts[0], group)), None)
+    used = {place for places in kinds.values() for place in places}
+    known = stamp | {(joint, kind): series[place].column for kind, places in kinds.items()
+                     for joint, place in zip(joints, places, strict=False)}
     if unlike:
-        raise AmbiguousColumns(joints, [{**kinds, EFFORT: group}
-                                        for group in (efforts[0], unlike)], series)
+        raise AmbiguousColumns(joints, [known | {
+            (joint, EFFORT): series[place].column for joint, place in zip(
+                joints, group, strict=False)} for group in (efforts[0], unlike)],
+            'two readings of the columns are as likely')
+    shares = _shares(values[:, efforts[0]], values[:, kinds[POSITION]], time) if efforts else []
+    if not efforts or min(shares) < table.UNLIKE_EFFORT < max(shares):
+        _ask_for_one(joints, known, [
+            each.column for place, each in enumerate(series) if place not in used])
+    if len(series) == count and not count % 2:
+        half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]
+        raise AmbiguousColumns(
+            joints, [known, stamp | dict(zip(half, (each.column for each in series), strict=True))],
+            f'there are positions of {count} joints, or positions and efforts of {count // 2} '
+            f'(then give --drives {",".join(joints[:count // 2])})')
     if efforts:
         kinds = {**kinds, EFFORT: _measured(values, efforts)}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
@@ -460,6 +550,15 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
         f'; {_span(series, unused)} not used' if unused else ''))
     return {(joint, kind): series[place].column for kind, places in kinds.items()
             for joint, place in zip(joints, places, strict=False)}
+
+
+def _ask_for_one(joints: Sequence[str], known: Columns, efforts: Sequence[Column]) -> None:
+    """Raise AmbiguousColumns: a column may be the effort of one joint, or of another."""
+    if len(joints) > 1 and efforts:
+        raise AmbiguousColumns(joints, [known | {(joint, EFFORT): column} for column in efforts[:2]
+                                        for joint in joints],
+                               f'no {len(joints)} columns are efforts of {", ".join(joints)}; '
+                               f'column {efforts[0]} may be that of one joint')
 
 
 def _are_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
@@ -575,19 +674,23 @@ def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
 
 
 def _explained(efforts: Array, position: Array, time: Array) -> float:
-    """Return the share of efforts that gravity, friction and inertia of any size explain.
+    """Return the mean of `_shares`; -1 where no effort changes."""
+    shares = _shares(efforts, position, time)
+    return float(np.mean(shares)) if shares else -1.0
+
+
+def _shares(efforts: Array, position: Array, time: Array) -> list[float]:
+    """Return the shares of efforts that change, which gravity, friction and inertia may explain.
 
     Positions may be in any unit of angles.
     """
     known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
              & np.isfinite(time))
-    efforts, position, time = efforts[known], position[known], time[known]
+    efforts, position, time = efforts[known], running_on(position[known]), time[known]
     swing = np.var(efforts, axis=0)
     moves = swing > 0
     if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):
-        return 0.0
-    if not np.any(moves):
-        return -1.0
+        return [0.0]
     half = max(2, len(time) // 200)
 
     def rate_of(values: Array) -> Array:
@@ -600,7 +703,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
     width = root_mean_square(speed) / 10 or 1.0
     rate = rate_of(speed)
     common = [np.ones(len(time)), speed, np.tanh(speed / width), rate]
-    shares = []
+    shares: list[list[float]] = []
     for unit in (1.0, *table.ANGLES, *table.COUNTS):
         angle = unit * position
         total = np.cumsum(angle, axis=1)
@@ -609,8 +712,8 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
             *(each * rate for each in np.cos(angle).T[1:, :, None])])
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
-        shares.append(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
-    return float(max(shares))
+        shares.append((1 - np.var(rest, axis=0)[moves] / swing[moves]).tolist())
+    return max(shares, key=sum)
 
 
 # ------------------------------------------------------------------------------------ units

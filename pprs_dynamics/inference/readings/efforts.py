@@ -28,6 +28,7 @@ from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
          recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
 
+
 def find_sign_bit(recording: Recording) -> Iterator[Defect]:
     """Yield efforts that are magnitudes with a bit for their sign, as servos report loads."""
     found: dict[int, list[int]] = {}

@@ -24,12 +24,11 @@ from pprs_dynamics.measurement.files.samples import Indices
 
 # ------------------------------------------------------------------------------------- units
 
-TICK = 2 * math.pi / 4096
 LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
-ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns', TICK: 'ticks of 4096 per turn'}
-# Other encoders, tried where all positions are whole numbers.
+ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns'}
+# Encoders, tried where all positions are whole numbers.
 COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
-          for bits in (10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
+          for bits in (12, 10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
@@ -82,6 +81,7 @@ WEAK = 0.01  # efforts and swings that are this much smaller than others tell no
 
 NEAR_UNIT = 0.05  # relative distance from a unit's constant
 SAME_MASSES = 3.0  # factor by which masses of a description are off at most
+OTHER_UNIT = 1.5  # factor from which on the unit of efforts without a name is a question
 CERTAIN = 3.0  # standard errors
 
 # ---------------------------------------------------------------- efforts that are not measured
@@ -108,11 +108,11 @@ POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current
 # Words of a title, and the quantity that they tell.
 WORDS = {
     POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
-               'enc', 'encoder', 'ticks', 'winkel', 'lage'),
+               'enc', 'encoder', 'ticks', 'th', 'winkel', 'lage', 'stellung', 'hub', 'weg'),
     VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
-               'omega', 'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
-    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'torq', 'force', 'moment',
-             'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
+               'omega', 'qvel', 'dpos', 'v', 'thd', 'dth', 'drehzahl', 'geschwindigkeit'),
+    EFFORT: ('effort', 'efforts', 'eff', 'tau', 'torque', 'torques', 'trq', 'torq', 'force',
+             'moment', 'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
 }
@@ -153,11 +153,12 @@ UNITS = {
                **dict.fromkeys(('deg/s', '°/s', 'grad/s', 'degs', 'dps'), math.pi / 180),
                **dict.fromkeys(('rev/s', 'turn/s', 'turns/s'), 2 * math.pi), 'mms': 1e-3},
     EFFORT: {'n': 1.0, 'nm': 1.0, 'mn': 1e-3, 'mnm': 1e-3, 'nmm': 1e-3, 'ncm': 1e-2, 'kn': 1e3,
-             'knm': 1e3, 'kgf': 9.80665, 'kgfm': 9.80665, **dict.fromkeys(('lbfin', 'inlb'),
-             0.1129848), **dict.fromkeys(('kgfcm', 'kgcm'), 0.0980665),
+             'knm': 1e3, 'kgf': 9.80665, 'kgfm': 9.80665, 'lbfin': 0.1129848, 'inlb': 0.1129848,
+             **dict.fromkeys(('kgfcm', 'kgcm'), 0.0980665),
              **dict.fromkeys(('lbfft', 'ftlb'), 1.3558179), 'ozin': 7.0615518e-3},
     CURRENT: {'a': 1.0, 'ma': 1e-3},
-    SHARE: {'%': 0.01, '‰': 1e-3},
+    SHARE: {**dict.fromkeys(('%', 'percent', 'pct', 'prozent'), 0.01),
+            **dict.fromkeys(('‰', 'permille', 'promille'), 1e-3)},
     TIME: {**dict.fromkeys(('s', 'sec'), 1.0),
            **dict.fromkeys(('ms', 'msec', 'millis', 'milliseconds'), 1e-3),
            **dict.fromkeys(('us', 'µs', 'usec', 'micros', 'microseconds'), 1e-6),
@@ -173,6 +174,8 @@ ROUGHER = 1.5  # third differences of what has noise, over those of what has non
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
+NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
+UNLIKE_EFFORT = 0.75  # share of a column that is explained: less beside one with more is none
 LEAST_ROWS = 30
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
@@ -260,7 +263,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: b
                 cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
                 what = f'the {_position(drives, group)} like {name}'
                 yield first.changed('position_unit', what, group, cost, scale=scale)
-                if unit == TICK or unit in COUNTS:
+                if unit in COUNTS:
                     yield first.changed(
                         'position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
                         cost + 1, scale=scale,

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,8 @@ class Design:
         None: the given model.
     carried : CarriedOver, optional
         Its mean is taken from what was measured, its directions are columns of every fit.
+    columns : mapping of str to (k, D, M) array
+        All by name, see `Sensitivities.columns`.
     """
 
     given: DriveModel
@@ -120,6 +123,7 @@ class Design:
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
     carried: CarriedOver | None = None
+    columns: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _moved: dict[tuple[Any, ...], tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Mapping[int, Array]] = field(
@@ -171,7 +175,7 @@ class Design:
             point.model, self.given, self.reconstructed(point.model), None,
             {effect.effect for effect in point.effects} if alone else None,
             {(column.drive, column.number) for column in self.base
-             if isinstance(column, ReversalShape)}).beside(self.carried)
+             if isinstance(column, ReversalShape)}, self._unmoved(point)).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if column.in_model:
@@ -188,6 +192,23 @@ class Design:
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
+
+    def _unmoved(self, point: OperatingPoint) -> dict[str, Array]:
+        """Return the columns that another operating point does not change noticeably.
+
+        Effects in drives add no load. Sensors of efforts change all columns but those of positions,
+        and what positions are off by only changes when friction turns over. Numbers move within
+        tolerances, which changes columns by products of small shares.
+        """
+        effects = {e.effect for at in (point, self.point) if at is not None for e in at.effects}
+        if not all(issubclass(effect, DriveEffect) for effect in effects):
+            return {}
+        if any(issubclass(effect, MeasurementEffect) and not effect.shifts_positions()
+               for effect in effects):
+            return {name: self.columns[name] for name in (HOMING, INERTIA) if name in self.columns}
+        turning = ((NUMBERS, OF_DRIVES, OF_JOINTS)
+                   if any(effect.shifts_positions() for effect in effects) else ())
+        return {name: column for name, column in self.columns.items() if name not in turning}
 
     def beside(self, carried: CarriedOver | None) -> Design:
         """Return this with what a reference says of the recordings, or unchanged for None."""
@@ -254,15 +275,27 @@ class Design:
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,
                    reversals: Container[tuple[int | None, int]] | None = None,
+                   known: Mapping[str, Array] = MappingProxyType({}),
                    ) -> Design:
-        """Return the design around a model; `reversals` are the widths that are left open there.
+        """Return the design around a model.
 
-        They are those of the given model around every other one: a sensor that says nothing of
-        small efforts, say, would leave some of them without a column.
+        Parameters
+        ----------
+        model, given : DriveModel
+        reconstructions : tuple of Reconstruction
+        progress : callable, optional
+        effects : container of type of CatalogueEffect, optional
+            The only ones outside the drives that get columns; by default all.
+        reversals : container of (int or None, int), optional
+            Widths that are left open. They are those of the given model around every other one: a
+            sensor that says nothing of small efforts, say, would leave some without a column.
+        known : mapping of str to (k, D, M) array, optional
+            Columns that are not computed again.
         """
         sensitivities = Sensitivities(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
+        sensitivities.known = frozenset(known)
         tables: list[dict[Any, Array]] = []
         full: list[FullRate] = []
         notes: list[str] = []
@@ -275,7 +308,7 @@ class Design:
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
-        stacked = stacked_columns(tables)
+        stacked = {**known, **stacked_columns(tables)}
         return cls._assembled(sensitivities, stacked, join_tables(model, tables), tuple(full),
                               tuple(notes), reconstructions, reversals)
 
@@ -332,7 +365,7 @@ class Design:
         homing, inertia = (tuple(dict(enumerate(column)) for column in stacked.get(name, ()))
                            for name in (HOMING, INERTIA))
         design = cls(given, model, residuals, full, (), structure, homing, inertia, notes,
-                     reconstructions, residuals.model)
+                     reconstructions, residuals.model, columns=stacked)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]

@@ -119,7 +119,9 @@ class Sensitivities:
     searched : tuple of type of StructureEffect
         Effects outside the drives that the given model could have and has not.
     of_zeros : bool
-        Whether `HOMING` is computed.
+        Whether `HOMING` is needed.
+    known : frozenset of str
+        Names of columns that are not computed.
     is_planned : bool
         Whether the motion is only planned. Columns of added bodies are then those of rigid bodies:
         all of them take one evaluation.
@@ -135,9 +137,11 @@ class Sensitivities:
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
         self.of_zeros = any(effect.shifts_positions() and given.offers(effect)
                             for effect in catalogue().values())
+        self.known = frozenset[str]()
         self.is_planned = False
         self._inertial: dict[type[AddedBody], Array] = {}
         self._links: tuple[Any, Array] = None, np.empty(0)  # state, and its regressor
+        self._own: tuple[Any, Array] = None, np.empty(0)  # state, and efforts of the model there
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
@@ -174,22 +178,26 @@ class Sensitivities:
         if self.model.robot.structure is None:
             # The loads of the closed form take less time than an interpolation saves.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
-        before = self._efforts(self.model, samples.nodes)
-        columns = {NUMBERS: self._of_numbers(forces, samples, before), OF_DRIVES: samples.treated(
-            reversal_columns(self.dry(state), state.velocity, state.direction,
-                             np.asarray(self.model.reversal.velocity)))}
-        for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
-            columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
-        if self.of_zeros:
+        columns: dict[str, Array] = {}
+        if NUMBERS not in self.known:
+            columns[NUMBERS] = self._of_numbers(forces, samples)
+            columns[OF_DRIVES] = samples.treated(reversal_columns(
+                self.dry(state), state.velocity, state.direction,
+                np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
+            for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
+                columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
+        if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
                 replace(slow, sensors=[]).interpolated, self._of_misreadings(slow.nodes))
-        known = {effect.name for effect in self.given.effects}
+        there = {effect.name for effect in self.given.effects}
         present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
-                   if isinstance(effect, StructureEffect) and effect.name in known}
+                   if isinstance(effect, StructureEffect) and effect.name in there}
         for name, effect in {**{one.name: one for one in self.searched}, **present}.items():
+            if name in self.known:
+                continue
             if issubclass(effect, BodyEffect):
                 columns[name], columns[BARE + name] = map(
-                    samples.interpolated, self._of_bodies(effect, samples.nodes, before))
+                    samples.interpolated, self._of_bodies(effect, samples.nodes))
             else:
                 columns[name] = samples.treated(self._of_forces(effect, state))
         return columns
@@ -204,7 +212,7 @@ class Sensitivities:
         Of each drive, (N, D) each.
         """
         step, drives = state.robot.position_step, range(len(self.model.drives))
-        before = self._efforts(self.model, state)
+        before = self._own_efforts(state)
         still = self._at(self.model, state).rigid_force
         return ([(self._efforts(self.model, self._at(self.model, state.perturbed(drive, -step)))
                   - before) / step for drive in drives],
@@ -216,6 +224,11 @@ class Sensitivities:
         total: Array = state.rigid_force + sum(
             effect.force(state) for effect in following(model))
         return total
+
+    def _own_efforts(self, state: Any) -> Array:
+        if self._own[0] is not state:
+            self._own = state, self._efforts(self.model, state)
+        return self._own[1]
 
     def _at(self, model: Any, state: Any) -> Any:
         """Return the same motion with the bodies and the reversals of another model."""
@@ -259,21 +272,20 @@ class Sensitivities:
             found[number] = models[place]
         return found
 
-    def _of_numbers(self, forces: Any, samples: Samples, before: Array) -> Array:
+    def _of_numbers(self, forces: Any, samples: Samples) -> Array:
         """Return the columns of all numbers, (M, K, D)."""
         columns = np.zeros((len(samples.treat), len(self.numbers), len(self.model.drives)))
         changes: dict[int, Array] = {}
         for row, number in enumerate(self.numbers):
             moved = self._moved[number]
             if id(moved) not in changes:
-                changes[id(moved)] = self._change(number, moved, forces, samples, before)[:, 0]
+                changes[id(moved)] = self._change(number, moved, forces, samples)[:, 0]
             drives = self.drives_of(number) or slice(None)
             columns[:, row, drives] = (changes[id(moved)][:, drives] * number.deviation
                                        / (RELATIVE_STEP * abs(number.value)))
         return columns
 
-    def _change(self, number: Number, moved: DriveModel, forces: Any, samples: Samples,
-                before: Array) -> Array:
+    def _change(self, number: Number, moved: DriveModel, forces: Any, samples: Samples) -> Array:
         """Return what a number moved by `RELATIVE_STEP` of itself changes, (M, 1, D)."""
         state = forces.mechanism
         if number.key == GAIN:
@@ -285,9 +297,10 @@ class Sensitivities:
         elif number.key.startswith('geometry.'):  # with it friction turns over at other times
             found = self._at(moved, moved.at_drives(state))
         else:
-            found = self._at(moved, samples.nodes)
-            return samples.interpolated([self._efforts(moved, found) - before])
-        return samples.treated([self._efforts(moved, found) - self._efforts(self.model, state)])
+            state = samples.nodes
+            return samples.interpolated([self._efforts(moved, self._at(moved, state))
+                                         - self._own_efforts(state)])
+        return samples.treated([self._efforts(moved, found) - self._own_efforts(state)])
 
     def _present(self, effect: type[StructureEffect]) -> StructureEffect | None:
         """Return an effect as the model has it."""
@@ -305,7 +318,7 @@ class Sensitivities:
         return [(effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale}).force(state)
                  - before) / c.scale for c in effect.coefficients]
 
-    def _of_bodies(self, effect: type[BodyEffect], state: Any, before: Array,
+    def _of_bodies(self, effect: type[BodyEffect], state: Any,
                    ) -> tuple[list[Array], list[Array]]:
         """Return columns of an effect on bodies, per unit of each coefficient.
 
@@ -320,6 +333,7 @@ class Sensitivities:
                 rigid = self._of_rigid_bodies(effect, state)
                 return rigid, rigid
         values = {} if present is None else effect.to_coefficients(present.values)
+        before = self._own_efforts(state)
         full, bare = [], []
         for c in effect.coefficients:
             moved = effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
@@ -412,7 +426,7 @@ def following(model: DriveModel) -> list[Effect]:
             and effect.initial_memory() is None]
 
 
-def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array) -> list[Array]:
+def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Array) -> list[Array]:
     """Return what dry friction that turns over otherwise changes, (N, D) each.
 
     Parameters
@@ -421,16 +435,16 @@ def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array
         Its size in full motion [N].
     velocity, direction : (N, D) array
         [m/s], and its sgn as the model has it.
-    width : float or (D,) array
-        Of the model's sgn [m/s].
+    widths : (W,) or (W, D) array
+        Other widths of the sgn [m/s].
 
     Returns
     -------
     list
-        A column for each of `DRIVE_WIDTHS`, odd in the direction; and an even one, for friction
+        A column for each width, odd in the direction; and an even one, for friction
         that differs by direction while it turns over.
     """
-    odd = [dry * (smooth_sign(velocity, factor * width) - direction) for factor in DRIVE_WIDTHS]
+    odd = [dry * (smooth_sign(velocity, width) - direction) for width in widths]
     return [*odd, dry * (1 - np.abs(direction))]
 
 
@@ -481,7 +495,8 @@ class ColumnCollector:
         self.kept.append((s.velocity, s.acceleration, s.direction, s.friction_load,
                           s.transmitted, effort))
         columns = self.sensitivities.columns(forces, treat)
-        columns[NUMBERS][:, self.without_gain] = 0.0
+        if NUMBERS in columns:
+            columns[NUMBERS][:, self.without_gain] = 0.0
         return {Column(name): self.share * column for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:

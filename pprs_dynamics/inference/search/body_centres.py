@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
 CLOSE = 1e-4  # of the reach, at which a search for a centre ends: columns move with it afterwards
 STARTS = np.vstack((np.zeros(3), np.eye(3), -np.eye(3))) / 8  # of the reach
-MOST_STEPS, FIRST_DAMPING, EASIER = 40, 1.0, 5.0
+MOST_STEPS = 40
 PULL = 1e-3  # of the error, by which a body at that reach is pulled to its place
 
 
@@ -85,56 +85,39 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     weight = PULL * float(np.linalg.norm(reduced[:, -1]))
 
     R, y = reduced[:, :-1], reduced[:, -1]
-    places, damping = size * STARTS, np.full(len(STARTS), FIRST_DAMPING)
-
-    def left(places: Array) -> tuple[Array, Array]:
-        """Return the residual of the mass that fits best at each place, and its derivatives."""
-        parameters, slopes = _point_mass(places)
-        u, by_place = parameters @ R.T, np.einsum('ij,sjk->sik', R, slopes)
-        square = np.maximum(np.sum(u * u, axis=1), 1e-300)
-        m = u @ y / square
-        by_mass = (np.einsum('sik,si->sk', by_place, y - 2 * m[:, None] * u)) / square[:, None]
-        residual = np.concatenate((y - m[:, None] * u, weight / size * places), axis=1)
-        pull = np.broadcast_to(weight / size * np.eye(3), (len(places), 3, 3))
-        slope = np.concatenate((-m[:, None, None] * by_place - u[:, :, None] * by_mass[:, None],
-                                pull), axis=1)
-        return residual, slope
-
-    residual, slope = left(places)
-    cost, ended = np.sum(residual ** 2, axis=1), np.zeros(len(STARTS), dtype=bool)
-    for _ in range(MOST_STEPS):  # of Levenberg and Marquardt, from all starts at once
-        H = slope.transpose(0, 2, 1) @ slope
-        np.einsum('skk->sk', H)[:] *= 1 + damping[:, None]
-        step = np.linalg.solve(H, np.einsum('sik,si->sk', slope, residual)[..., None])[..., 0]
-        tried = np.clip(places - step, -size, size)
-        residual_there, slope_there = left(tried)
-        cost_there = np.sum(residual_there ** 2, axis=1)
-        better = cost_there < cost
-        ended |= better & (cost - cost_there < CLOSE / 10 * cost) | (
-            np.abs(tried - places).max(axis=1) < CLOSE * size)
-        damping *= np.where(better, 1 / EASIER, EASIER)
-        for old, new in ((places, tried), (residual, residual_there), (slope, slope_there),
-                         (cost, cost_there)):
-            old[better] = new[better]
-        if np.all(ended):
-            break
-    return tuple(places[np.argmin(cost)].tolist())
+    found = []
+    for there in size * STARTS:
+        least, place = np.inf, there
+        for _ in range(MOST_STEPS):  # of Gauss and Newton, in mass and place
+            parameters, slopes = _point_mass(place)
+            u = R @ parameters
+            m = float(u @ y / max(float(u @ u), 1e-300))
+            residual = np.concatenate((y - m * u, -weight / size * place))
+            cost = float(residual @ residual)
+            if np.abs(place - there).max() < CLOSE * size and np.isfinite(least):
+                break
+            if cost > least:
+                place = (place + there) / 2
+                continue
+            slope = np.block([[u[:, None], m * R @ slopes],
+                              [np.zeros((3, 1)), weight / size * np.eye(3)]])
+            step = np.linalg.lstsq(slope, residual, rcond=None)[0][1:]
+            least, there, place = cost, place, np.clip(place + step, -size, size)
+        found.append((least, there.tolist()))
+    return tuple(min(found)[1])
 
 
-def _point_mass(places: Array) -> tuple[Array, Array]:
-    """Return mass, first moment and inertia of 1 kg at places (S, 3), (S, 10), by them (S, 10, 3).
+def _point_mass(place: Array) -> tuple[Array, Array]:
+    """Return mass, first moment and inertia of 1 kg at a place, (10,), and by it, (10, 3).
 
     In the order of `MOMENTS` and `PRODUCTS`.
     """
-    x, y, z = places.T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    parameters = np.stack((one, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y,
-                           -x * y, -x * z, -y * z), axis=1)
-    slopes = np.stack([np.stack(row, axis=1) for row in (
-        (zero, one, zero, zero, zero, 2 * x, 2 * x, -y, -z, zero),
-        (zero, zero, one, zero, 2 * y, zero, 2 * y, -x, zero, -z),
-        (zero, zero, zero, one, 2 * z, 2 * z, zero, zero, -x, -y))], axis=2)
-    return parameters, slopes
+    x, y, z = place
+    return (np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y,
+                      -x * y, -x * z, -y * z]),
+            np.array([[0, 1, 0, 0, 0, 2 * x, 2 * x, -y, -z, 0],
+                      [0, 0, 1, 0, 2 * y, 0, 2 * y, -x, 0, -z],
+                      [0, 0, 0, 1, 2 * z, 2 * z, 0, 0, -x, -y]]).T)
 
 
 def reach_of(robot: Mechanism) -> float:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -96,7 +97,8 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
             break
         best = found
     if best is not reported:
-        _simplest(fits, best, likely.values())
+        for fitted in _of_one_cause(fits, best, likely.values()):
+            fits.pruned(fits.evaluate(_refined(fits, fitted).candidates))
 
 
 def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:
@@ -260,52 +262,26 @@ def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
     return fitted
 
 
-def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCandidate],
-              ) -> CandidateSet:
-    """Return the best of a set and those in which one effect changes when several did.
+def _of_one_cause(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCandidate],
+                  ) -> list[CandidateSet]:
+    """Return the best sets in which one effect alone changes, at the times found for a set.
 
-    What changes at one time has one cause, and what comes and goes is one stretch.
+    What changes at one time has one cause. All are under the noise of the set: with its own, one
+    that is a block off costs as much as one that is far off.
     """
-    courses = [candidate.course for candidate in fitted.effects if candidate.course is not None]
-    edges = sorted({at for course in courses if course.kind != DRIFT
-                    for at in ((course.begin, course.end)
-                               if course.kind == DURING else (course.begin,))})
-    first, last = fits.design.residuals.time[[0, -1]].tolist()
-    ends = np.linspace(first, last, STRETCHES + 1).tolist()
-    dated = {candidate.effect for candidate in fitted.effects if candidate.course is not None}
-    tried = [*(Course(SINCE, at, last) for at in _amid_motion(fits, edges)),
-             *(Course(DURING, begin, end) for k, begin in enumerate(edges)
-               for end in edges[k + 1:])]
-    constant = tuple(candidate for candidate in fitted.effects if candidate.course is None)
-    simpler: list[CandidateSet] = []
-    for effect in effects:
-        beside = tuple(present for present in constant if present.effect is not effect.effect)
-        # What begins may end where nothing else begins.
-        passing = [Course(DURING, begin, end) for begin in edges for end in ends
-                   if end > begin] if effect.effect in dated else []
-        # With its own noise one that is a block off costs as much as one that is far off.
-        simpler += [fits.at_noise_of(fitted, (*rest, _with_course(effect, course)))
-                    for course in (*tried, *passing) for rest in dict.fromkeys(((), beside))]
-    best: dict[tuple[str, str], CandidateSet] = {}
-    for other in sorted(simpler, key=lambda fitted: fitted.total):
-        changing = next(effect for effect in other.effects if effect.course is not None)
-        assert changing.course is not None
-        best.setdefault((changing.name, changing.course.kind), other)
-    # A change that is a hundredth of a second off costs more than patterns that make it good.
-    offers = [fits.evaluate(_refined(fits, offer).candidates)
-              for offer in list(best.values())[:COURSE_TRIALS]]
-    return _lasting(fits, min([fitted, *map(fits.pruned, offers)],
-                              key=lambda fitted: fitted.cost))
-
-
-def _lasting(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
-    """Return a set in which what is there for a stretch stays, where that costs less."""
     last = float(fits.design.residuals.time[-1])
-    for candidate in fitted.effects:
-        course = candidate.course
-        if (course is not None and course.kind == DURING
-                and _amid_motion(fits, [course.begin])):
-            stays = _with_course(candidate, Course(SINCE, course.begin, last))
-            fitted = min(fitted, _refined(fits, fits.evaluate((*fitted.without(candidate), stays))),
-                         key=lambda fitted: fitted.cost)
-    return fitted
+    edges = sorted({at for candidate in fitted.effects if candidate.course is not None
+                    for at in (candidate.course.begin, candidate.course.end)} - {last})
+    courses = [*(Course(SINCE, at, last) for at in _amid_motion(fits, edges)),
+               *(Course(DURING, *times) for times in combinations(edges, 2))]
+    constant = [candidate for candidate in fitted.effects if candidate.course is None]
+    tried = []
+    for effect in effects:
+        beside = tuple(other for other in constant if other.effect is not effect.effect)
+        tried += [(fits.at_noise_of(fitted, (*rest, _with_course(effect, course))),
+                   (effect.name, course.kind))
+                  for course in courses for rest in dict.fromkeys(((), beside))]
+    best: dict[tuple[str, str], CandidateSet] = {}
+    for one, key in sorted(tried, key=lambda scored: scored[0].total):
+        best.setdefault(key, one)
+    return list(best.values())[:COURSE_TRIALS]

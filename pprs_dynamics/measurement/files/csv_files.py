@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import IO, Any, TextIO, cast
 
 import numpy as np
+from dateutil.parser import parse as parse_date
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import Column
@@ -46,6 +47,7 @@ NO_NUMBERS = ['', 'nan', 'NaN', 'NAN', 'N/A', 'NA', 'null', 'NULL', 'None']
 PREAMBLE = 20  # lines that may stand above a table
 NO_TEXT = ('not a recording, must be a bag (rosbag2, .mcap, .db3, ROS 1) or a table (.csv, '
            '.parquet, .mat, .npz, .json)')
+CLOCK = re.compile(r'\d(:\d\d|T\d{4})')  # in every time of day
 CONTROLS = re.compile(rb'[\x00-\x08\x0e-\x1f]')  # in no text
 BEGINNING = 1 << 16  # bytes by which the encoding is recognised
 
@@ -270,7 +272,8 @@ def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:
     line = BLANK.join(line.split()) if separator == BLANK else line.rstrip('\n')
     try:
         # The reader takes the second line into a cell if a quote is left open.
-        cells, *following = csv.reader([f'{line}\n', 'following'], delimiter=separator)
+        cells, *following = csv.reader([f'{line}\n', 'following'], delimiter=separator,
+                                       skipinitialspace=True)
     except csv.Error as error:
         raise UnreadableFileError(path, f'row {number} is no row of a table: {error}') from None
     if not following:
@@ -300,10 +303,19 @@ def _is_value(cell: str, decimal: str) -> bool:
 
 
 def _seconds_of(date: str) -> float:
-    """Return seconds since 1970 of an ISO 8601 date, UTC if it has no zone; NaN if it is empty."""
+    """Return seconds since 1970 of a date with a time of day, UTC if it has no zone.
+
+    A time of day alone counts from midnight; an empty cell is NaN. The day is first where points
+    are between the numbers, as in German.
+    """
     if not date:
         return float('nan')
-    moment = datetime.fromisoformat(date.strip().replace(',', '.'))
+    if not CLOCK.search(date):
+        raise ValueError(date)
+    try:
+        moment = datetime.fromisoformat(date.replace(',', '.'))
+    except ValueError:
+        moment = parse_date(date, default=datetime(1970, 1, 1), dayfirst='.' in date.split(':')[0])
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 

@@ -23,9 +23,12 @@ from pprs_dynamics.measurement.files.bag_files import read_bag, write_bag
 from pprs_dynamics.measurement.files.bag_storage import is_storage
 from pprs_dynamics.measurement.files.csv_files import write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
-from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples
+from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, Samples
 from pprs_dynamics.measurement.files.table_files import read_table
 from pprs_dynamics.system.plain_text import counted, displayed
+
+# Share of a turn that a step has at least where an angle begins again.
+MOST_OF_TURN, TURN_ROUNDING = 0.75, 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,12 +246,33 @@ def _scaled(samples: Samples, drives: RecordedDrives) -> Samples:
     for d, one in enumerate(of_drives):
         if one.effort_sign_bit is not None:
             effort[:, d] = signed(effort[:, d], one.effort_sign_bit)
+    position, wraps = unwrapped(samples.position * scale, [
+        2 * np.pi if units.turns else np.inf for units in drives.units] or [np.inf] * len(scale))
+    wrapped = [drive for drive, count in zip(drives.names, wraps.tolist(), strict=True) if count]
+    told = Defect('wrapped_position', int(wraps.sum()), 'the position jumps by a turn of '
+                  + ', '.join(wrapped), drives=tuple(wrapped))
     return replace(
-        samples, position=samples.position * scale + offset,
+        samples, position=position + offset, findings=(*samples.findings, *[told][:len(wrapped)]),
         velocity=None if velocity is None else velocity * speed,
         effort=effort * force * drives.effort_factor,
         channels={name: values * scale + offset if CHANNELS[name] == 'm' else values
                   for name, values in samples.channels.items()})
+
+
+def unwrapped(values: Array, periods: Sequence[float]) -> tuple[Array, Indices]:
+    """Return angles, (N, D), that run on where they began again, and how often, (D,).
+
+    Angles of which each lies within one period begin again where they jump by nearly all of it.
+    """
+    found, counts = values.copy(), np.zeros(len(periods), dtype=np.int64)
+    for d, period in enumerate(periods):
+        known = np.flatnonzero(np.isfinite(values[:, d]))
+        angles = values[known, d]
+        jumps = np.abs(np.diff(angles)) > MOST_OF_TURN * period
+        if np.any(jumps) and np.ptp(angles) <= period * (1 + TURN_ROUNDING):
+            found[known, d] = np.unwrap(angles, MOST_OF_TURN * period, period=period)
+            counts[d] = jumps.sum()
+    return found, counts
 
 
 def signed(magnitude: Array, bit: int) -> Array:

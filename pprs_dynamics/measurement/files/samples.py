@@ -50,6 +50,7 @@ POLICY = {
     'unordered_stamps': 'they are sorted in',
     'duplicate_stamps': 'the first sample of each stamp is kept',
     'position_spike': 'those samples are dropped',
+    'wrapped_position': 'it runs on there',
     'position_jump': 'the recording is split there',
     'gap': 'the recording is split there',
     'lost_samples': 'they stay within one segment, to be interpolated',

@@ -38,7 +38,7 @@ from pprs_dynamics.system.plain_text import counted
 TIME_COLUMNS = ('time', '__time')
 # What other programs call it.
 TIME_LIKE = ('t', 'ts', 'stamp', 'stamps', 'timestamp', 'timestamps', 'times', 'seconds', 'sec',
-             'clock', 'rostime', 'date', 'datum', 'datetime', 'zeit', 'uhrzeit')
+             'clock', 'rostime', 'date', 'datum', 'datetime', 'zeit', 'uhrzeit', 'zeitstempel')
 # Stamps that count thousandths, millionths, ... of seconds since 1970 are of 2000 to 2100, and
 # nearer to each other than this [s]: others count from the start of a machine.
 DATES = 9.4e8, 4.2e9
@@ -77,6 +77,7 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         table = _opened(files.pop('time'), columns)
         own: Column = columns.time if columns.time is not None else next(
             (name for name in TIME_COLUMNS if name in table.names), 1)
+        _require(table, [own])
         shared = table.read([own])[0]
     stamps, epoch, prefix = np.zeros(0), 0, ''
     arrays: dict[tuple[str, str], Array] = {}
@@ -92,7 +93,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
             chosen, prefix = _chosen(table, drives, columns, topic)
         if not chosen:
             continue
-        wanted = list(dict.fromkeys([*([] if time is None else [time]), *chosen.values()]))
+        stamped = [] if time is None else [time, columns.time_fraction or time]
+        wanted = list(dict.fromkeys([*stamped, *chosen.values()]))
         _require(table, wanted)
         read = dict(zip(wanted, table.read(wanted, progress), strict=True))
         count = len(read[wanted[-1]])
@@ -100,6 +102,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
             raise UnreadableFileError(file, f'it has {counted(count, "row")}, but the file of '
                                       f'times has {len(shared)}')
         seconds, start, remarks = _seconds(shared if time is None else read[time], columns, count)
+        if columns.time_fraction is not None and time is not None:
+            seconds = seconds + fraction_of_seconds(read[columns.time_fraction])
         series = {key: read[column] for key, column in chosen.items()}
         seconds = seconds + (start - epoch if arrays else 0)
         if not arrays:
@@ -115,13 +119,22 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
                               epoch)
 
 
+def fraction_of_seconds(counts: Array) -> Array:
+    """Return the seconds that whole milliseconds, microseconds or nanoseconds are, by their size.
+
+    They are below a second, and a recording has some near to it.
+    """
+    most = float(np.nanmax(counts, initial=0.0))
+    return counts / next((10.0 ** power for power in PARTS if most < 10.0 ** power), 1e9)
+
+
 def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
     """Return a table by its first bytes; see `CsvTable.open`."""
     return open_arrays(path) or CsvTable.open(path, decimal, likely)
 
 
 def _opened(path: Path, columns: RecordedColumns) -> Table:
-    named = [*columns.channels.values(),
+    named = [columns.time_fraction, *columns.channels.values(),
              *(one for of in columns.drives.values() for one in of.names.values())]
     return open_table(path, columns.decimal,
                       [one for one in (columns.time, *named) if isinstance(one, str)])

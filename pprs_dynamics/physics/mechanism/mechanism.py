@@ -131,11 +131,14 @@ class Mechanism:
         found = []
         for k, name in enumerate(self.body_names):
             if k != self.carrier and self.masses[k] > 0:
-                _, frame = self.structure.links[name]
-                x, y, z = frame.inverse.of_point(self.inertial[k, 1:4] / self.inertial[k, 0])
-                found.append(BodyPlace(name, (round(float(x), 6), round(float(y), 6),
-                                              round(float(z), 6)), float(self.masses[k])))
+                x, y, z = (round(each, 6) for each in self.centre_of(name).tolist())
+                found.append(BodyPlace(name, (x, y, z), float(self.masses[k])))
         return tuple(found)
+
+    def centre_of(self, link: str) -> Array:
+        """Return the centre of mass of a body in the frame of one of its links, (3,) [m]."""
+        row, frame = self.structure.links[link]
+        return frame.inverse.of_point(self.by_joint[row, 1:4] / self.by_joint[row, 0])
 
     @property
     def moved_mass(self) -> float:
@@ -223,18 +226,6 @@ class Mechanism:
         structure = self.structure
         return SLIDE if structure.kinds == (PRISMATIC,) and not structure.loops else MECHANISM
 
-    @cached_property
-    def load_is_known(self) -> bool:
-        """Whether friction follows what the drives carry.
-
-        On a slide alone that no gravity pulls, preload rubs, and the weight on its guide.
-        """
-        if self.kind == MECHANISM:
-            return True
-        row = self.structure.rows[self.structure.drives[0]]
-        t = self.structure.tables
-        return bool(abs(t.axis[row] @ t.place_R[row].T @ self.gravity_row) > LEAST_GRAVITY)
-
     @property
     def motions(self) -> tuple[type, ...]:
         """Kinds of motion that have forces: of the drives, and of the tool where it has loops."""
@@ -318,10 +309,20 @@ class Mechanism:
 
     def one_pass(self, motion: JointMotion | PlatformMotion,
                  parameters: tuple[JointFriction, Array], closed: dict[Any, Array] | None,
-                 ) -> InverseDynamicsResult | None:
+                 has_state: bool = False) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
+
+        Parameters
+        ----------
+        motion : JointMotion or PlatformMotion
+        parameters : tuple
+            See `friction_parameters`.
+        closed : dict of Structure to array, optional
+            See `ModelState`.
+        has_state : bool
+            Whether the state for the motion is made next from the result.
         """
         if not isinstance(motion, JointMotion):
             return None
@@ -335,8 +336,8 @@ class Mechanism:
         return found
 
     def friction_load(self, state: MechanismState) -> Array:
-        """Return what the drives' gears carry [N m, N], (N, D); 0 if that is not known."""
-        load: Array = np.abs(state.transmitted) * self.load_is_known
+        """Return what the drives' gears carry [N m, N], (N, D)."""
+        load: Array = np.abs(state.transmitted)
         return load
 
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
@@ -351,8 +352,8 @@ class Mechanism:
         return float(1 - state.links.condition.max() / WORST_CONDITION)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
-        """Return the loads of the gears, where they are known."""
-        return {'load': state.friction_load} if self.load_is_known else {}
+        """Return the loads of the gears."""
+        return {'load': state.friction_load}
 
     def require_bodies(self, key: str, value: Any) -> None:
         """Raise ModelError, of a key and its value, for bodies that cannot be."""

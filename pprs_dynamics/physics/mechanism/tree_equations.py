@@ -447,8 +447,8 @@ def update_frame_placements(t: Model, m: Data) -> None:
         i = t.joints[j, PARENT]
         s = t.ratio[j] * m.q[t.joints[j, COORDINATE]] + t.offset[j]
         axis = vector(frames, j, AXIS)
-        origin = plus(vector(links, i, P), turned(links, i, R,
-                                                       vector(frames, j, PLACE_P)))
+        origin = plus(vector(links, i, P),
+                      turned(links, i, R, vector(frames, j, PLACE_P)))
         z = turned(links, i, R, turned(frames, j, PLACE_R, axis))
         if t.joints[j, TURNS]:
             # Columns of the rotation about the axis, each taken to the base.

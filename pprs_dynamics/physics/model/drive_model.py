@@ -403,7 +403,8 @@ class DriveModel:
         singularity: the caller must check every sample then.
         """
         parameters = self._own_parameters
-        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed)
+        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
+                                                                    bool(self._added))
         return None if found is None else Forces(
             found.efforts[TOTAL], lambda: self._own_parts(found.efforts),
             lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),

@@ -4,11 +4,11 @@
 """How a model's drives are called on the machine: in messages, and in the columns of files.
 
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
-time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …}, DRIVE: {position:
-COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN, pressure: COLUMN,
-effort_scale: NUMBER, position_scale: NUMBER, position_offset: NUMBER, velocity_scale: NUMBER,
-effort_sign_bit: NUMBER}}`, a `temperature: COLUMN` or `pressure: COLUMN` of the whole machine
-there, and `effort_kind`: what efforts are.
+time_fraction: COLUMN, time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …},
+DRIVE: {position: COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN,
+pressure: COLUMN, effort_scale: NUMBER, position_scale: NUMBER, position_offset: NUMBER,
+velocity_scale: NUMBER, effort_sign_bit: NUMBER}}`, a `temperature: COLUMN` or `pressure: COLUMN` of
+the whole machine there, and `effort_kind`: what efforts are.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.physics.model.keys import GAIN, Key
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
-TIME, FILES = 'time', 'files.'
+TIME, FRACTION, FILES = 'time', 'time_fraction', 'files.'
 LARGEST_BIT = 31
 QUANTITIES = ('position', 'velocity', 'effort', 'current', *CHANNELS)
 SCALES = ('effort_scale', 'position_scale', 'velocity_scale')
@@ -121,7 +121,7 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
     return RecordedColumns(
         given.get(TIME), found, given.get('time_scale'), given.get('rate'),
         given.get('decimal', '.'), files,
-        {name: given[name] for name in CHANNELS if name in given})
+        {name: given[name] for name in CHANNELS if name in given}, given.get(FRACTION))
 
 
 def _below(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
@@ -176,7 +176,7 @@ def _as(declared: Key) -> Check:
 
 _name = _as(Key('', 'of a joint, or a file', is_text=True))
 OF_TABLE: dict[str, Check] = {
-    TIME: _column, 'time_scale': _factor,
+    TIME: _column, FRACTION: _column, 'time_scale': _factor,
     'rate': _as(Key('', 'samples per second', 'Hz', positive=True)),
     'decimal': _as(Key('', 'mark of decimals', choices=('.', ','))),
     **dict.fromkeys(CHANNELS, _column)}

@@ -216,7 +216,7 @@ def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
         See `PlatformMotion.rows`.
     load : (N, 9) or (1, 9) array
         Wrench of the platform, and moments in the hinges.
-    parts : (EVERYTHING, N, 6) array
+    parts : (EVERYTHING, N, 6) or (GUIDE_LOAD, N, 6) array
 
     Returns
     -------
@@ -254,12 +254,13 @@ def _is_sound(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
         _write(parts, POSITION, s, i, c.slide, c.lift)
         _write(parts, VELOCITY, s, i, c.slide_velocity, c.lift_velocity)
         _write(parts, ACCELERATION, s, i, c.slide_acceleration, c.lift_acceleration)
-        _write(parts, GUIDE_LOAD, s, i, f.slide_load, f.lift_load)
-        _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
-        _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
-        _write(parts, RESISTANCE, s, i, k[i][0], k[i][1])
-        _write_twist(parts, s, i, 1.0, slides[i])
-        _write_twist(parts, s, CHAINS + i, c.sin_u, lifts[i])
+        if len(parts) > GUIDE_LOAD:
+            _write(parts, GUIDE_LOAD, s, i, f.slide_load, f.lift_load)
+            _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
+            _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
+            _write(parts, RESISTANCE, s, i, k[i][0], k[i][1])
+            _write_twist(parts, s, i, 1.0, slides[i])
+            _write_twist(parts, s, CHAINS + i, c.sin_u, lifts[i])
     return is_within_bounds(p, chains, slides, lifts)
 
 

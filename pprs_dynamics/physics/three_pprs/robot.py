@@ -338,12 +338,11 @@ class ThreePprs:
             float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
 
     def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
-                 ) -> InverseDynamicsResult | None:
-        """Return the forces for a motion, friction included.
-
-        None where a sample may be out of reach or too near a singularity.
-        """
-        table = np.empty((closed_form.EVERYTHING, len(motion), 6))
+                 has_state: bool = False) -> InverseDynamicsResult | None:
+        """Return the forces for a motion, friction included; see `Mechanism.one_pass`."""
+        # Memory is what limits long motions: the rows that only a state reads take 12 % longer.
+        rows = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
+        table = np.empty((rows, len(motion), 6))
         if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
             return None
         return InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
@@ -415,7 +414,9 @@ class ThreePprs:
         """
         # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            links = ClosedForm(self, motion, table=None if found is None else found.efforts)
+            table = None if found is None or len(found.efforts) < closed_form.EVERYTHING else (
+                found.efforts)
+            links = ClosedForm(self, motion, table=table)
             if not links.is_regular:
                 links.require_regular()
         return MechanismState(links.position, links.velocity, links.acceleration, motion.time,

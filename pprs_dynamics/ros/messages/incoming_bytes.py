@@ -32,7 +32,8 @@ def message_in(data: bytes, kind: type) -> Any:
     data : bytes
         As a raw subscription gives them.
     kind : type
-        MultiDOFJointTrajectory, JointTrajectory, JointState, Float64MultiArray or String.
+        Bytes of other kinds than MultiDOFJointTrajectory, JointTrajectory, JointState,
+        Float64MultiArray and String are only deserialised.
 
     Raises
     ------
@@ -50,10 +51,26 @@ def message_in(data: bytes, kind: type) -> Any:
     return message
 
 
+def only_whole(kind: type, callback: Callable[[Any], None]) -> Callable[[bytes], None]:
+    """Return a callback for bytes that passes whole messages of a kind on, and drops all else.
+
+    Where rclpy deserialises, bytes that are no message raise in the executor and end the node.
+    They come from another release of a message, or from a program at fault.
+    """
+    def take(data: bytes) -> None:
+        try:
+            message = message_in(data, kind)
+        except Rejection:
+            return
+        callback(message)
+
+    return take
+
+
 def is_whole(data: bytes, kind: type = MultiDOFJointTrajectory) -> bool:
     """Return whether the bytes hold every element that their length words promise."""
-    if len(data) < HEADER or data[0] or data[1] > 1:
-        # Another encoding: its deserialiser has to know.
+    if len(data) < HEADER or data[0] or data[1] > 1 or kind not in _WALKS:
+        # Another encoding, or another kind: the deserialiser has to know.
         return len(data) >= HEADER
     walk = Walk(data)
     try:

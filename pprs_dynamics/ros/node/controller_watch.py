@@ -17,6 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.ros.force_command import STILL
+from pprs_dynamics.ros.messages.conversions import LARGEST
 
 STATE_TOPIC = 'controller_state'  # beside the controller's joint_trajectory
 LOOKED_BACK = 1.0  # [s] of what was sent and of where the controller went
@@ -107,10 +108,12 @@ class ControllerWatch:
         was_silent = silence > max(LOOKED_BACK, SLOW * self._step)
         self._hold_is_due |= was_silent and has_commanded
         self._step = silence if np.isfinite(silence) else 0.0
-        values = dict(zip(state.joint_names, reference.positions, strict=False))
+        # A reference that is no position of a drive is none.
+        values = {joint: place for joint, place in zip(
+            state.joint_names, reference.positions, strict=False) if abs(place) <= LARGEST}
         if was_silent or any(joint not in values for joint in self._joints):
             self._went.clear()
-        self._stands = not np.any(np.abs(reference.velocities) > STILL)
+        self._stands = bool(np.all(np.abs(reference.velocities) <= STILL))
         if any(joint not in values for joint in self._joints):
             return
         place = np.array([values[joint] for joint in self._joints])

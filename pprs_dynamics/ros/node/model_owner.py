@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
@@ -19,8 +20,7 @@ from std_msgs.msg import String
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.ros.messages.incoming_bytes import message_in
-from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.node.parameters import HISTORY
 from pprs_dynamics.ros.node.qos import LATCHED, subscription
 
@@ -34,6 +34,40 @@ class NotSetError(PprsError):
 
     def __init__(self, reason: str) -> None:
         super().__init__(f'nothing was set: {reason}')
+
+
+class OwnerStatus(NamedTuple):
+    """What the node that drives says of itself.
+
+    Parameters
+    ----------
+    robot : str
+    files : tuple of str
+        Names of its parameter files.
+    fingerprint : str
+        SHA-256 of its model; '' before the first status.
+    changes : int
+        That `restore` can undo.
+    """
+
+    robot: str = ''
+    files: tuple[str, ...] = ()
+    fingerprint: str = ''
+    changes: int = 0
+
+    @classmethod
+    def of(cls, text: str) -> OwnerStatus:
+        """Return the status in a JSON text.
+
+        Raises
+        ------
+        ValueError, TypeError, LookupError, OverflowError
+            Where it is no status of a node that drives: the topic belongs to nobody.
+        """
+        said = json.loads(text)
+        model = said['model']
+        return cls(str(said['robot']), tuple(Path(each['file']).name for each in model['files']),
+                   str(model['sha256']), int(said['changes']))
 
 
 class ModelOwner:
@@ -54,34 +88,24 @@ class ModelOwner:
     def __init__(self, node: Node, name: str, model: Callable[[], DriveModel],
                  follow: Callable[[list[Parameter]], None]) -> None:
         self.name, self._node, self._model, self._follow = name, node, model, follow
-        self.status: dict[str, Any] = {}
+        self.status = OwnerStatus()
         self._client = AsyncParameterClient(node, name)
-        # Raw: bytes that are no message would end the executor.
-        subscription(node, String, f'{name}/status', self._on_status, raw=True, profile=LATCHED)
+        subscription(node, String, f'{name}/status', only_whole(String, self._on_status),
+                     profile=LATCHED)
 
     @property
     def is_there(self) -> bool:
         """Whether the node runs."""
         return self._client.services_are_ready()
 
-    @property
-    def steps(self) -> int:
-        """Number of changes that `restore` can undo."""
-        return int(self.status.get('changes', 0))
-
-    @property
-    def fingerprint(self) -> str:
-        """SHA-256 of the model in force; '' before the first status."""
-        return str(self.status.get('model', {}).get('sha256', ''))
-
     def difference(self) -> str:
         """Return that the owner has another model in force, or '' where it has not, or is gone."""
-        here = self._model().fingerprint
-        if self.fingerprint in ('', here) or not self._node.count_publishers(
+        here, there = self._model().fingerprint, self.status.fingerprint
+        if there in ('', here) or not self._node.count_publishers(
                 f'{self.name}/status'):
             return ''
         return (f'{self.name} has another model in force than {self._node.get_name()} '
-                f'(sha256 {self.fingerprint[:12]}, not {here[:12]})')
+                f'(sha256 {there[:12]}, not {here[:12]})')
 
     def set_model(self, values: Values) -> Future[Any]:
         """Set a model's values on the owner, all or none; return the future of its answer.
@@ -97,15 +121,12 @@ class ModelOwner:
             raise NotSetError(different)
         return self._client.set_parameters_atomically(changes(self._model(), values))
 
-    def _on_status(self, data: bytes) -> None:
-        with suppress(Rejection, ValueError):
-            found = json.loads(message_in(data, String).data, parse_constant=lambda _: None)
-            if not isinstance(found, dict):
-                return
-            before, self.status = self.fingerprint, found
-            here = self._model().fingerprint
-            if before == here != self.fingerprint:
-                self._client.list_parameters().add_done_callback(self._on_names)
+    def _on_status(self, message: String) -> None:
+        before = self.status.fingerprint
+        with suppress(ValueError, TypeError, LookupError, OverflowError):
+            self.status = OwnerStatus.of(message.data)
+        if before == self._model().fingerprint != self.status.fingerprint:
+            self._client.list_parameters().add_done_callback(self._on_names)
 
     def _on_names(self, future: Future[Any]) -> None:
         known = self._model().values

@@ -50,13 +50,13 @@ def publisher(node: Node, kind: type, topic: str, profile: QoSProfile = EVERY_ME
 
 
 def subscription(
-    node: Node, kind: type, topic: str, callback: Callable[..., None], raw: bool = False,
+    node: Node, kind: type, topic: str, callback: Callable[..., None],
     profile: QoSProfile = EVERY_MESSAGE,
 ) -> Any:
-    """Create a subscription whose QoS qos_overrides.<topic>.subscription.* change."""
+    """Create a subscription to bytes, whose QoS qos_overrides.<topic>.subscription.* change."""
     return _overridable(node, topic, lambda options: node.create_subscription(
         kind, node.resolve_topic_name(topic), callback, copy.copy(profile),
-        qos_overriding_options=options, raw=raw))
+        qos_overriding_options=options, raw=True))
 
 
 def _overridable(node: Node, topic: str, create: Callable[[QoSOverridingOptions], Any]) -> Any:

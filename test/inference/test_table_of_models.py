@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a table of models says of rivals, suspects and residuals, where costs of rows are given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from single_axis import AXIS, Effects, axis, axis_recording
+
+from pprs_dynamics.inference.diagnosis.answer import Answer, objection, rival_effects
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.residuals import rms
+from pprs_dynamics.inference.search.candidates import Candidate, Component, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.estimates import estimate
+from pprs_dynamics.inference.search.held_out import BLOCKS, HeldOut, PredictiveGain, hold_out
+from pprs_dynamics.inference.search.table import ModelTable, Row
+from pprs_dynamics.inference.search.unknown import best_patterns
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+
+TWO: Effects = {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}
+MARGIN = DECISIONS.rival_margin
+
+
+@cache
+def table_of(*names: str) -> ModelTable:
+    """Return the table of an axis with effects of `TWO`."""
+    run = axis_recording(axis({name: TWO[name] for name in names}))
+    table = diagnose(axis(), [run]).selection
+    assert table is not None
+    assert {effect.name for effect in table.best.effects} == set(names)
+    return table
+
+
+def effect(name: str, variant: int = 0) -> EffectCandidate:
+    kind = CATALOGUE[name]
+    return EffectCandidate.of([Component.of(kind, 0, {}, kind.variants[variant])])
+
+
+def with_rows(table: ModelTable, costs: Mapping[tuple[Candidate, ...], float]) -> ModelTable:
+    """Return a table in which only the best row and these are near, at costs above the best."""
+    exact = {table.best.fitted.row_key: table.best}
+    for candidates, above in costs.items():
+        fitted = replace(table.last.evaluate(candidates), barred='')
+        exact[fitted.row_key] = Row(table.last, fitted, table.best.cost + above - fitted.total)
+    return replace(table, exact={**table.exact, **exact})
+
+
+VISCOUS, INERTIA, SPRING, DRY = map(effect, (
+    'viscous_friction', 'drive_inertia', 'drive_spring', 'coulomb_friction'))
+
+
+def test_one_effect_in_the_place_of_two_is_a_rival_of_both() -> None:
+    table = with_rows(table_of(*TWO), {(SPRING,): 1.0})
+    assert set(Answer(table, table.best, ()).diagnosis().indistinguishable) >= {
+        (name, 'drive_spring') for name in TWO}
+
+
+def test_a_rival_is_taken_from_a_row_without_the_effect_that_it_replaces() -> None:
+    table = with_rows(table_of(*TWO), {(VISCOUS, INERTIA, SPRING): 1.0, (VISCOUS, SPRING): 2.0})
+    rival, = (rival for rival in rival_effects(Answer(table, table.best, ()).diagnosis())
+              if rival.found.name == 'drive_spring')
+    assert rival.of == 'drive_inertia'
+    assert rival.cost == pytest.approx(2.0)
+
+
+def test_a_freer_form_of_the_same_friction_is_no_rival() -> None:
+    table = table_of('viscous_friction')
+    kind = CATALOGUE['asymmetric_friction']
+    both = effect('asymmetric_friction', kind.variants.index(
+        ('viscous_forward', 'viscous_backward')))
+    assert [rival.instead for rival in with_rows(
+        table, {(both,): 1.0, (SPRING,): 2.0}).rivals(MARGIN)] == [('drive_spring',)]
+    # With as many coefficients it is another claim, however alike the columns are.
+    found = with_rows(table, {(DRY,): 1.0})
+    row = found.rows[1]
+    (mine,), (theirs,) = table.best.fitted.blocks.values(), row.fitted.blocks
+    alike = Row(row.fits, replace(row.fitted, blocks={theirs: mine}), row.linearisation)
+    found = replace(found, exact={**found.exact, row.fitted.row_key: alike})
+    assert [rival.instead for rival in found.rivals(MARGIN)] == [('coulomb_friction',)]
+
+
+def test_a_suspect_is_one_more_effect_beside_all_that_is_reported() -> None:
+    table = table_of('viscous_friction')
+    pattern = best_patterns(table.patterns, table.last.evaluate(()).fit, 1)[0]
+    found = with_rows(table, {(INERTIA, pattern): 1.0, (VISCOUS, SPRING): 2.0})
+    assert [candidate.name for candidate, _ in found.suspects(5.0)] == ['drive_spring']
+
+
+@pytest.mark.parametrize(('present', 'missing', 'low', 'high'), [
+    # Beyond what the form of a small force may leave, and beyond what the form of any may.
+    ({'coulomb_friction': {'force': 0.3}}, {'drive_spring': {'stiffness': 4.0, 'position': 0.0}},
+     1.5, 5.0),
+    ({'coulomb_friction': {'force': 12.0}}, {'drive_inertia': {'mass': 1.0}}, 5.0, 20.0)])
+def test_what_no_form_explains_is_above_the_noise(
+    present: Effects, missing: Effects, low: float, high: float,
+) -> None:
+    table = diagnose(axis(), [axis_recording(axis({**present, **missing}))]).selection
+    assert table is not None
+    fits = table.best.fits
+    fitted = fits.evaluate(tuple(c for c in table.best.fitted.candidates if c.name in present))
+    found = Answer(table, Row(fits, fitted, 0.0), ()).diagnosis()
+    assert {one.name for one in found.effects} == set(present)
+    assert low < found.above_noise[AXIS] < high
+    assert found.verdict == 'unknown'
+
+
+def test_an_effect_within_the_form_error_of_the_models_friction_is_not_reported() -> None:
+    """Of 40 N s/m, 1.5 % is the form error beside another effect."""
+    small: Effects = {'viscous_friction': {'coefficient': 0.3}}
+    found = diagnose(axis(), [axis_recording(axis({'drive_inertia': {'mass': 3.0}, **small}))])
+    assert 'viscous_friction' not in {one.name for one in found.effects}
+    alone = diagnose(axis(), [axis_recording(axis(small), noise=0.05)])
+    assert [one.name for one in alone.effects] == ['viscous_friction']
+
+
+def test_an_uncertainty_is_that_of_all_near_sets_with_the_effect() -> None:
+    """About the reported value, weighed by exp(-cost / 2): whether 30 g are missing is in doubt."""
+    table = diagnose(axis(), [axis_recording(axis(
+        {'viscous_friction': {'coefficient': 12.0}, 'drive_inertia': {'mass': 0.03}}))]).selection
+    assert table is not None
+    key, answer = f'{AXIS}.coefficient', Answer(table, table.best, ())
+    found = next(one for one in answer.effects if one.name == 'viscous_friction').parameters[key]
+    values, weights = [], []
+    for cost, fitted in [(0.0, table.reported), *table.near(MARGIN)]:
+        friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
+        values.append(estimate(table.last, fitted, friction).parameters[key])
+        weights.append(np.exp(-cost / 2))
+    assert len(values) > 2
+    squares = [one.std ** 2 + (one.value - found.value) ** 2 for one in values]
+    assert found.std ** 2 == pytest.approx(np.average(squares, weights=weights), rel=1e-3)
+    assert found.std > 1.01 * values[0].std
+
+
+def gain(*in_errors: float) -> PredictiveGain:
+    """Return gains of drives that are so many of their standard errors."""
+    spread = 10 * np.tile([-1.0, 1.0], 5)[:, None]
+    return PredictiveGain(tuple('abcdef'[:len(in_errors)]), spread + np.array(in_errors)
+                          * spread.std(ddof=1) / 10 ** 0.5, np.full((10, len(in_errors)), 1e-3))
+
+
+@pytest.mark.parametrize(('ratio', 'found', 'words'), [
+    (2.0, gain(9.0), ''), (0.995, gain(9.0), ''), (0.9, gain(9.0), 'the error is 10% smaller'),
+    (2.0, None, 'cannot confirm it'), (2.0, gain(np.nan), 'cannot confirm it'),
+    (2.0, gain(-3.0), 'predicted worse with it, by 3 standard errors'), (2.0, gain(-1.0), ''),
+    (2.0, gain(4.0, -4.0), 'of b are predicted worse'), (2.0, gain(90.0, -4.0), '')])
+def test_data_object_to_an_effect_that_raises_the_error(
+    ratio: float, found: PredictiveGain | None, words: str,
+) -> None:
+    said = objection(ratio, found, DECISIONS)
+    assert words in said
+    assert bool(said) is bool(words)
+
+
+def test_a_fit_pays_for_the_numbers_that_it_moves() -> None:
+    residuals, _ = measure_residuals(axis(), [axis_recording(axis())])
+    free, moved = (HeldOut(1.0, np.full(BLOCKS, penalty), residuals) for penalty in (0.0, 3.0))
+    assert free.gain(moved).gains.sum() == pytest.approx(-3.0 * BLOCKS / BLOCKS)
+
+
+def test_blocks_are_predicted_with_the_reversals_of_the_model() -> None:
+    """The width of reversals is unknown in every fit, and is no part of what is adopted."""
+    run = axis_recording(axis({'viscous_friction': {'coefficient': 3.0}},
+                              **{'friction.reversal_velocity': 0.1}), noise=0.01)
+    table = diagnose(axis(), [run]).selection
+    assert table is not None
+    fits = table.first
+    assert hold_out(fits, fits.evaluate(())).error > 0.9 * rms(measure_residuals(axis(), [run])[0])
