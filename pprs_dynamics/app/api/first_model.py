@@ -89,34 +89,107 @@ class Names:
     prefix: str = ''
 
 
-@dataclass(frozen=True)
+@dataclass
 class FirstModel:
     """A model file that is to be written.
 
     Parameters
     ----------
-    path : Path
-        Where it will stand, from which the description's path counts.
-    text : str
-        Its content, with comments.
-    model : DriveModel
-        The same, built.
-    notes : tuple of str
-        What was guessed, and what could not be known.
-    recordings : tuple of Path
+    robot, path : Path
+        The description, and the model file.
+    is_mjcf : bool
+    description : Description
+    base : str
+    branch : Branch
+    drives : tuple of str
+    names : Names
+    recordings : list of Path
         As they are given to commands: of several files that make one, their folder or the first.
-    has_efforts : bool
-    questions : tuple of str
+    columns : dict
+        Content of the key `columns`.
+    guessed : list of str
+        Comments.
+    kinds : set of str
+        Quantities that are recorded.
+    notes : list of str
+        What was guessed, and what could not be known.
+    questions : list of str
         Where a reading is not sure: lines, of which one is to be written.
     """
 
+    robot: Path
     path: Path
-    text: str
-    model: DriveModel
-    notes: tuple[str, ...]
-    recordings: tuple[Path, ...]
-    has_efforts: bool
-    questions: tuple[str, ...] = ()
+    is_mjcf: bool
+    description: Description
+    base: str
+    branch: Branch
+    drives: tuple[str, ...]
+    names: Names
+    recordings: list[Path]
+    columns: dict[str, Any] = field(default_factory=dict)
+    guessed: list[str] = field(default_factory=list)
+    kinds: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
+
+    @property
+    def has_efforts(self) -> bool:
+        """Whether efforts are recorded that a model can be fitted to."""
+        return bool({EFFORT, CURRENT} & self.kinds) and EXTERNAL not in self.kinds
+
+    @property
+    def model(self) -> DriveModel:
+        """The model of the file."""
+        return DriveModel.from_parameters(parse_parameters(self.text, self.path),
+                                          source=str(self.path))
+
+    @property
+    def text(self) -> str:
+        """Content of the file."""
+        place = os.path.relpath(self.robot.resolve(), self.path.resolve().parent)
+        slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
+        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
+        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
+        files = ', '.join(recording.name for recording in self.recordings[:3])
+        read_with = f', read with {files}' if files else ''
+        lines = [
+            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
+            'be checked.',
+            '/**:',
+            '  ros__parameters:',
+            '    robot:',
+            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
+            'this file',
+            f'      base: {scalar(self.base)}  # the link that does not move',
+            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
+            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
+            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
+            'recorded efforts are currents',
+            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
+            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
+            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
+            'where ripple is looked for',
+            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
+              for loop in self.description.loops),
+            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
+            + ', '.join(EFFORT_KINDS),
+            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
+        ]
+        renamed = {drive: self.names.joints[drive] for drive in self.drives
+                   if self.names.joints.get(drive, drive) != drive}
+        if self.names.prefix:
+            first = self.drives[0]
+            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
+                         f'{first} {self.names.prefix}{first}')
+        elif renamed:
+            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
+        if self.columns:
+            lines += ['    columns:  # of tables: names, or numbers from 1',
+                      *(f'      # guessed: {note}' for note in self.guessed),
+                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
+                        for key, value in self.columns.items())]
+        lines += [f'    # not sure: {question}' for question in self.questions]
+        return '\n'.join(lines) + '\n'
 
 
 def first_model(
@@ -171,8 +244,8 @@ def first_model(
         by_numbers = not all(map(_is_short_for, names.joints, names.joints.values()))
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
-    draft = _Draft(path, Path(output), is_mjcf, description, base or root_of(description), branch,
-                   chosen, names, [file.name for file in given])
+    draft = FirstModel(path, Path(output), is_mjcf, description, base or root_of(description),
+                       branch, chosen, names, given, notes=notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
@@ -181,7 +254,6 @@ def first_model(
             notes.append(str(error))
             draft.questions += error.lines
         notes += draft.guessed
-    has_efforts = bool({EFFORT, CURRENT} & draft.kinds) and EXTERNAL not in draft.kinds
     if given and not draft.questions:
         notes += _correct(draft, given[0])
     if by_numbers:
@@ -190,14 +262,13 @@ def first_model(
             f'recording of this robot, keep joint_map: {_yaml(names.joints)}')
     if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
-                     f'{draft.output.name}')
-    if given and not has_efforts and EXTERNAL not in draft.kinds:
+                     f'{draft.path.name}')
+    if given and not draft.has_efforts and EXTERNAL not in draft.kinds:
         notes.append('no efforts were found: compare, diagnose and fit need them')
-    return FirstModel(draft.output, draft.text, draft.model, tuple(notes), tuple(given),
-                      has_efforts, tuple(draft.questions))
+    return draft
 
 
-def _correct(draft: _Draft, path: Path) -> list[str]:
+def _correct(draft: FirstModel, path: Path) -> list[str]:
     """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
     A kind of mistake that comes again after its correction is a question.
@@ -229,7 +300,7 @@ def _correct(draft: _Draft, path: Path) -> list[str]:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
-def _unit_questions(draft: _Draft, model: DriveModel, recording: Recording) -> list[str]:
+def _unit_questions(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
     """Return questions about efforts whose unit a file does not say: shares, and numbers alone."""
     efforts = {drive: column for drive in draft.drives
                if (column := draft.columns.get(drive, {}).get(EFFORT)) is not None}
@@ -489,97 +560,6 @@ def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 # -------------------------------------------------------------------------------------- text
-
-
-@dataclass
-class _Draft:
-    """What is known of a model file that is being written.
-
-    Parameters
-    ----------
-    robot, output : Path
-        The description, and the model file.
-    is_mjcf : bool
-    description : Description
-    base : str
-    branch : Branch
-    drives : tuple of str
-    names : Names
-    recordings : list of str
-    columns : dict
-        Content of the key `columns`.
-    guessed, questions : list of str
-        Comments.
-    kinds : set of str
-        Quantities that are recorded.
-    """
-
-    robot: Path
-    output: Path
-    is_mjcf: bool
-    description: Description
-    base: str
-    branch: Branch
-    drives: tuple[str, ...]
-    names: Names
-    recordings: list[str]
-    columns: dict[str, Any] = field(default_factory=dict)
-    guessed: list[str] = field(default_factory=list)
-    questions: list[str] = field(default_factory=list)
-    kinds: set[str] = field(default_factory=set)
-
-    @property
-    def model(self) -> DriveModel:
-        """The model of the file."""
-        return DriveModel.from_parameters(parse_parameters(self.text, self.output),
-                                          source=str(self.output))
-
-    @property
-    def text(self) -> str:
-        """Content of the file."""
-        place = os.path.relpath(self.robot.resolve(), self.output.resolve().parent)
-        slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
-        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
-        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
-        read_with = f', read with {", ".join(self.recordings[:3])}' if self.recordings else ''
-        lines = [
-            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
-            'be checked.',
-            '/**:',
-            '  ros__parameters:',
-            '    robot:',
-            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
-            'this file',
-            f'      base: {scalar(self.base)}  # the link that does not move',
-            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
-            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
-            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
-            'recorded efforts are currents',
-            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
-            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
-            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
-            'where ripple is looked for',
-            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
-              for loop in self.description.loops),
-            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
-            + ', '.join(EFFORT_KINDS),
-            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
-        ]
-        renamed = {drive: self.names.joints[drive] for drive in self.drives
-                   if self.names.joints.get(drive, drive) != drive}
-        if self.names.prefix:
-            first = self.drives[0]
-            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
-                         f'{first} {self.names.prefix}{first}')
-        elif renamed:
-            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
-        if self.columns:
-            lines += ['    columns:  # of tables: names, or numbers from 1',
-                      *(f'      # guessed: {note}' for note in self.guessed),
-                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
-                        for key, value in self.columns.items())]
-        lines += [f'    # not sure: {question}' for question in self.questions]
-        return '\n'.join(lines) + '\n'
 
 
 def _comment(key: str, value: Any) -> str:
