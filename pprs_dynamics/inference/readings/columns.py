@@ -38,7 +38,7 @@ ROLE = '(ist|soll|act|cmd|meas|fbk|des|ref)'
 # Words that another may precede in one: Gelenkmoment, but not timestamp nor payload.
 LONG, LONGER = ('|'.join(sorted((word for word in QUANTITIES if len(word) >= least), reverse=True))
                 for least in (3, 5))
-COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG})(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
+COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG}|d?qd?)(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
                       f'|([a-z]{{3,}})({LONGER})(?:e?[ns])?(?:{ROLE}(?:wert)?)?')
 
 
@@ -339,8 +339,6 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         shared = [joint for joint in groups[best] if all(joint in groups[key] for key in rivals)]
         blocks = [[places[groups[key][joint]] for joint in shared] for key in rivals]
         best = rivals[_measured(values, blocks)] if shared else best
-        if {*best} & table.COMMANDS:
-            notes.append(f'{each}: only commands are there ({" ".join(best)})')
         if each == EFFORT:
             columns = {key: column for key, column in columns.items() if key[1] != CURRENT}
         columns.update({(joint, each): column for joint, column in groups[best].items()})
@@ -380,7 +378,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
     # The name of the joint alone is a position, as in `shoulder_pan`.
-    plain = not told and not {*key} - {'*', 'observation'}
+    plain = not told and not {*key} - {'*', 'observation'} - table.MEASURED
     fits = given is not None or quantity in told or (quantity == POSITION and plain)
     if quantity == POSITION and VELOCITY in told:
         fits = False
