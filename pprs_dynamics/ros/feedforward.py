@@ -74,10 +74,8 @@ class FeedforwardNode(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
-        self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
-        self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         parameters = parameters_for(drive_count(self))
         self._settings = ModelParameters(
@@ -127,18 +125,14 @@ class FeedforwardNode(ManagedNode):
             self, lambda: self._settings.node_values['command_timeout'], self._on_stale)
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
-        self._inputs = [
-            subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
-                         profile=SETPOINTS)
-            for topic, reader in self._readers.items()]
+        for topic, reader in self._readers.items():
+            self._until_cleanup(self.destroy_subscription, subscription(
+                self, reader.message, topic, partial(self._on_trajectory, reader),
+                profile=SETPOINTS))
         if JointTrajectoryControllerState is not None:
-            self._inputs.append(subscription(
+            self._until_cleanup(self.destroy_subscription, subscription(
                 self, JointTrajectoryControllerState, self._controller_topic,
                 only_whole(JointTrajectoryControllerState, self._on_controller)))
-
-    def _publisher(self, kind: type, topic: str) -> Any:
-        self._publishers_made.append(publisher(self, kind, topic))
-        return self._publishers_made[-1]
 
     def _create_parts(self) -> None:
         known = self._settings.model.knows_currents
@@ -155,15 +149,14 @@ class FeedforwardNode(ManagedNode):
                 self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
 
     def _destroy_topics(self) -> None:
-        for each in self._inputs:
-            self.destroy_subscription(each)
+        super()._destroy_topics()
         if self._watchdog is not None:
             self._watchdog.destroy()
-        for each in (*self._publishers_made, *self._parts.values(), self._current):
+        for each in (*self._parts.values(), self._current):
             if each is not None:
                 self.destroy_publisher(each)
         self._watchdog = self._current = None
-        self._inputs, self._publishers_made, self._parts = [], [], {}
+        self._parts = {}
 
     def _use_settings(self) -> None:
         node_values = self._settings.node_values

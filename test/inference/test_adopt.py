@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pprs_command import pprs
+from single_axis import axis, axis_recording
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -167,12 +168,25 @@ def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     model, recording = synthetic({}, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert not answer.adopted
-    assert 'would push along the motion' in answer.reason
+    assert 'more is taken away than the model has' in answer.reason
     rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
     model, recording = synthetic(rough, **rough, **hidden)
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert answer.adopted, answer.reason
     assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
+
+
+@pytest.mark.parametrize(('name', 'other'), [
+    ('viscous_friction', 'drive_spring'), ('drive_spring', 'viscous_friction')])
+def test_held_out_errors_are_those_with_the_added_effect_alone(name: str, other: str) -> None:
+    """The new model lacks the other effect, whose force decides neither for nor against it."""
+    model, robot = axis(), axis({'viscous_friction': {'coefficient': 30.0},
+                                 'drive_spring': {'stiffness': 80.0, 'position': 0.0}})
+    answer = adopt(model, EffectRequest.of(name, model.drives), [axis_recording(robot)])
+    assert answer.adopted, answer.reason
+    assert other in ' '.join(answer.remarks)
+    assert answer.held_out_before == pytest.approx(answer.error_before, rel=0.1)
+    assert answer.held_out_after == pytest.approx(answer.error_after, rel=0.1)
 
 
 def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:

@@ -112,16 +112,16 @@ class FirstModel:
     names : Names
     recordings : list of Path
         As they are given to commands: of several files that make one, their folder or the first.
+    notes : list of str
+        What was guessed, and what could not be known.
     columns : dict
         Content of the key `columns`.
     guessed : list of str
-        Comments.
-    kinds : set of str
-        Quantities that are recorded.
-    notes : list of str
-        What was guessed, and what could not be known.
+        Comments on `columns`.
     questions : list of str
         Where a reading is not sure: lines, of which one is to be written.
+    kinds : set of str
+        Quantities that are recorded.
     """
 
     robot: Path
@@ -133,15 +133,15 @@ class FirstModel:
     drives: tuple[str, ...]
     names: Names
     recordings: list[Path]
+    notes: list[str]
     columns: dict[str, Any] = field(default_factory=dict)
     guessed: list[str] = field(default_factory=list)
-    kinds: set[str] = field(default_factory=set)
-    notes: list[str] = field(default_factory=list)
     questions: list[str] = field(default_factory=list)
+    kinds: set[str] = field(default_factory=set)
 
     @property
     def has_efforts(self) -> bool:
-        """Whether efforts are recorded that a model can be fitted to."""
+        """Whether efforts of the drives are recorded."""
         return bool({EFFORT, CURRENT} & self.kinds) and EXTERNAL not in self.kinds
 
     @property
@@ -157,8 +157,8 @@ class FirstModel:
         slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
         gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
         kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
-        files = ', '.join(recording.name for recording in self.recordings[:3])
-        read_with = f', read with {files}' if files else ''
+        names = [recording.name for recording in self.recordings[:3]]
+        read_with = f', read with {", ".join(names)}' if names else ''
         lines = [
             f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
             'be checked.',
@@ -252,7 +252,7 @@ def first_model(
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
     draft = FirstModel(path, Path(output), is_mjcf, description, base or root_of(description),
-                       branch, chosen, names, given, notes=notes)
+                       branch, chosen, names, given, notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(

@@ -53,8 +53,8 @@ def run(options: argparse.Namespace) -> int:
     drives = [name for name in options.drives.split(',') if name]
     first = first_model(options.robot, options.recordings, options.output, base=options.base,
                         tool=options.tool, drives=drives, rate=options.rate)
-    model = first.model
     write_text(options.output, first.text)
+    model = first.model
     for line in mechanism_lines(model) if model.moves_joints else ():
         screen.print(shown(line))
     for note in first.notes:
@@ -83,10 +83,10 @@ def run(options: argparse.Namespace) -> int:
         screen.print(shell_command(f'pprs info {names} --model {file}'))
     if options.json:
         write_json(options.json, {
-            'model': options.output, 'notes': list(first.notes),
+            'model': options.output, 'notes': first.notes,
             'drives': list(model.drives),
             'recordings': [asdict(summary) for summary in summaries],
-            'questions': list(first.questions)})
+            'questions': first.questions})
     if first.questions:
         screen.print('[bold]Not sure[/]: the lines are comments in the model file; write what is '
                      'true, or go on with --as-it-is')

@@ -221,14 +221,6 @@ class TickFits:
         """Return a set under the noise of another: linear, in milliseconds."""
         return self.fits.at_noise_of(near, tuple(candidates))
 
-    def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
-        """Return a set with its own noise."""
-        return self.fits.evaluate(tuple(candidates))
-
-    def refined(self, found: CandidateSet) -> CandidateSet:
-        """Return the set with all shapes where the cost is lowest."""
-        return self.fits.refined(found)
-
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
         """Return a set with the linear parameters that somebody chose; all else follows."""
         blocks: list[Block] = []

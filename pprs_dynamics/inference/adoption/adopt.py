@@ -35,7 +35,7 @@ from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import calibrations, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
-from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_gain
+from pprs_dynamics.inference.search.held_out import PredictiveGain, hold_out, predictive_gain
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
@@ -44,7 +44,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
@@ -52,8 +51,6 @@ DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
 SURE = 2.0  # standard deviations by which a number must differ from 0
-MOVING = 5.0  # widths of reversal, above which a drive moves
-PUSHES = 0.1  # of the moving time, in which friction may give power back
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 
 
@@ -235,7 +232,8 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     assert table is not None
     row = requested_row(table, request)
     answer = Answer(table, row, case.validate)
-    effect = next(effect for effect in answer.effects if effect.name == name)
+    candidate = next(c for c in row.effects if c.name == name)
+    effect = answer.found(candidate)
     after, gone = requested_model(answer, request, effect)
     objections = list(_of_table(case, request, table, row, effect))
     if refused := [component.drive for component in row.fits.refused(row.fitted)
@@ -245,8 +243,6 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                           f'{places and f" on {places}"}: beyond its bounds, or more is taken away '
                           'than the model has')
     residuals = case.residuals(case.recordings, case.model, after)
-    if request.effect.is_friction and not gone:
-        objections += _of_friction(effect, after, residuals[-1])
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(table.first.decisions.rival_margin)
         if name in (*rival.missing, *rival.instead)
@@ -260,13 +256,14 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
         remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
                        'were tried')
     if others:
-        remarks.append(f'The recordings also show {listed(others)}' + (
-            '' if case.validate else '; held-out blocks are predicted with all of these'))
+        remarks.append(f'The recordings also show {listed(others)}')
+    # The new model has this effect alone, in the value that it has beside the others.
+    held_out = [] if case.validate else [
+        hold_out(row.fits, row.fitted, only).error for only in ((), candidate.components)]
     prefix = f'effects.{name}.'
     return case.adoption(
-        request, after, residuals, (effect.held_out_before, effect.held_out_after), effect.gain,
-        tuple(objections), drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
-        moments=effect.moments, parameters={
+        request, after, residuals, held_out, effect.gain, tuple(objections), drives=effect.drives,
+        remarks=tuple(remarks), rivals=rivals, moments=effect.moments, parameters={
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
@@ -403,28 +400,6 @@ def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
         return (f'{request.name} is in the model already, and the recordings support no other '
                 f'values: {more}',)
     return (f'the recordings do not support {request.name}: {more} than the model without it',)
-
-
-@outside_cost('adopt refuses friction that pushes along the motion')
-def _of_friction(effect: FoundEffect, model: DriveModel, residuals: Residuals) -> tuple[str, ...]:
-    """Return whether friction of a model would push along the motion, on a drive or in all."""
-    on_drives = [each.name for each in model.effects if each.name == ACTIVE_FRICTION or (
-        isinstance(each, DriveEffect) and each.is_friction)]
-    elsewhere = [each.name for each in model.effects if each.name == PASSIVE_FRICTION or (
-        isinstance(each, StructureEffect) and each.is_friction)]
-    velocity = residuals.variables['velocity']
-    moving = np.abs(velocity) > MOVING * np.asarray(model.reversal.velocity)
-    power = velocity * sum(residuals.parts.get(name, 0.0) for name in (
-        on_drives if effect.drives else [*on_drives, *elsewhere]))
-    for place in effect.drives or ('all drives',):
-        chosen = ([residuals.drives.index(place)] if effect.drives
-                  else range(len(residuals.drives)))
-        moves = moving[:, chosen].any(axis=1)
-        share = float(np.mean(power[moves][:, chosen].sum(axis=1) < 0)) if moves.any() else 0.0
-        if share > PUSHES:
-            return (f'friction on {place} would push along the motion in {share:.0%} of the '
-                    'moving time',)
-    return ()
 
 
 # A measured curve

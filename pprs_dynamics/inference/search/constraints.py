@@ -4,7 +4,7 @@
 """What coefficients of a set may be: one list of inequalities, solved at once.
 
 - Each parameter is within the bounds of its effect.
-- No drive has less than no inertia, viscous or dry friction, the model's own included.
+- No drive has less than no inertia, viscous, dry or load friction, the model's own included.
 - An added body is a body, and a link from which one is taken away remains one.
 
 Inequalities of the first two kinds are linear. Possible bodies form a convex set, which tangent
@@ -39,6 +39,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
 )
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import KEPT, MOMENTS, AddedBody, with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
@@ -50,12 +51,14 @@ if TYPE_CHECKING:
 
 # What coefficients add to in a drive: its inertia, or its friction in some directions.
 INERTIA, VISCOUS_FRICTION, DRY_FRICTION = 'inertia', 'viscous friction', 'dry friction'
+LOAD_FRICTION = 'friction coefficient'
 FORWARD, BACKWARD = 'forward', 'backward'
 BOTH = (FORWARD, BACKWARD)
 Total = tuple[str, str]  # of what, in which direction
 ADDS_TO: Mapping[tuple[str, str], tuple[Total, ...]] = {
     (DriveInertia.name, 'mass'): ((INERTIA, ''),),
     (ViscousFriction.name, 'coefficient'): tuple((VISCOUS_FRICTION, way) for way in BOTH),
+    (LoadFriction.name, 'coefficient'): ((LOAD_FRICTION, ''),),
     (CoulombFriction.name, 'force'): tuple((DRY_FRICTION, way) for way in BOTH),
     **{(AsymmetricFriction.name, name): ((VISCOUS_FRICTION, way),)
        for name, way in zip(VISCOUS, BOTH, strict=True)},
@@ -240,8 +243,9 @@ def own_total(design: Design, drive: int, of: str) -> float:
     if of == INERTIA:
         return _own_inertia(design, drive)
     friction = design.given.friction
-    if of == VISCOUS_FRICTION:
-        return float(np.broadcast_to(friction.viscous, len(design.drives))[drive])
+    whole = {VISCOUS_FRICTION: friction.viscous, LOAD_FRICTION: friction.coefficient}
+    if of in whole:
+        return float(np.broadcast_to(whole[of], len(design.drives))[drive])
     usual = np.zeros(len(design.drives))
     if 'load' in design.residuals.variables:
         usual = np.median(np.abs(design.residuals.variables['load']), axis=0)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -270,6 +270,8 @@ class FittedSets:
             return None
         fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)),
                                  fitted.fit.amplitudes)
+        if not moved and _gain(fit, [block for _, block in slopes]) < LEAST_IMPROVEMENT:
+            return None
         for component, block in slopes:
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
@@ -305,6 +307,13 @@ class FittedSets:
             gap = known[at] - known[at - 1]
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
+
+
+def _gain(fit: JointFit, blocks: Sequence[Block]) -> float:
+    """Return by how much some columns lower the deviance, at the noise of the fit."""
+    places = np.concatenate([np.arange(len(fit.coefficients))[fit.places[b]] for b in blocks])
+    c = fit.coefficients[places]
+    return float(c @ np.linalg.solve(fit.covariance[np.ix_(places, places)], c))
 
 
 def _stepped(coefficients: Array) -> Array:
