@@ -47,7 +47,7 @@ from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
@@ -97,7 +97,6 @@ class FeedforwardNode(ManagedNode):
         self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
-        self._files = files_given(arguments)
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
@@ -398,13 +397,11 @@ class FeedforwardNode(ManagedNode):
         lag = self._lag.summary()
         waits = (lag['p50'] or 0.0) > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
-            state=self.state, assumed=self._settings.model.assumed_at_start,
+            self._settings.facts, state=self.state, assumed=self._settings.model.assumed_at_start,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=lag,
-            lagging=bool(threshold and accepted > before and waits),
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
-            changes=len(self._settings.history or ()))
+            lagging=bool(threshold and accepted > before and waits))
 
 
 def _since(stamp: int) -> float:

@@ -34,7 +34,7 @@ from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.system.plain_text import for_json
@@ -95,7 +95,6 @@ class MonitorNode(ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
@@ -224,9 +223,7 @@ class MonitorNode(ManagedNode):
         # The first window, and what is still on its way, is none that is missing.
         if came >= ENOUGH and compared > came:
             self._share = min(1.0, were / came)
-        self._status.facts.update(
-            compared_share=round(self._share, 3),
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint})
+        self._status.facts.update(self._settings.facts, compared_share=round(self._share, 3))
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""

@@ -135,8 +135,4 @@ def test_long_work_leaves_lines_in_a_log(
     with terminal.staged_bar(screen) as show:
         show('diagnosing', 0.3)
         time.sleep(0.2)
-    with terminal.counting_bar(screen, 'recordings', 2) as count:
-        count()
-        time.sleep(0.2)
-    lines = set(capsys.readouterr().err.splitlines())
-    assert {'diagnosing 30% after 0 s', '1 of 2 recordings after 0 s'} <= lines
+    assert 'diagnosing 30% after 0 s' in capsys.readouterr().err.splitlines()

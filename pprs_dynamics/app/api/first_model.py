@@ -26,6 +26,7 @@ from pprs_dynamics.inference.readings.columns import (
 )
 from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
 from pprs_dynamics.inference.readings.table import (
+    COMMANDS,
     CURRENT,
     EFFORT,
     POSITION,
@@ -54,7 +55,13 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
-from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS, EXTERNAL, MEASURED
+from pprs_dynamics.physics.model.recorded_names import (
+    COMMANDED,
+    EFFORT_KIND,
+    EFFORT_KINDS,
+    EXTERNAL,
+    MEASURED,
+)
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
@@ -290,7 +297,7 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
                 each.what + (f': if so, write {line}' if line else '') for each in readings
                 for line in [each.line or columns_line([each])]]
             if not any(each.kind.startswith(('effort', 'drive_constant')) for each in readings):
-                draft.questions += _unit_questions(draft, model, recording)
+                draft.questions += _questions_of_names(draft, model, recording)
             return notes + draft.questions
         for each in sure:
             corrected.add(each.kind)
@@ -300,16 +307,22 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
-def _unit_questions(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
-    """Return questions about efforts whose unit a file does not say: shares, and numbers alone."""
+def _questions_of_names(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
+    """Return questions about commands, and about efforts whose unit a file does not say."""
     efforts = {drive: column for drive in draft.drives
                if (column := draft.columns.get(drive, {}).get(EFFORT)) is not None}
-    shares = [drive for drive, column in efforts.items() if isinstance(column, str)
-              and f'<{SHARE}>' in words_of(column)]
+    chosen = [column for drive in draft.drives for kind in (POSITION, EFFORT) if isinstance(
+        column := draft.columns.get(drive, {}).get(kind), str)]
+    commands = [column for column in chosen if {*words_of(column)} & COMMANDS]
+    if commands:
+        return [f'{", ".join(commands)}: commands by their names, where the measured columns are '
+                'not known. Write their names in place of these, or, if no effort was measured, '
+                f'{EFFORT_KIND}: {COMMANDED}']
+    shares = [column for column in chosen if f'<{SHARE}>' in words_of(column)]
     if shares:
-        return [f'{efforts[shares[0]]} is a share of a torque or force that the file does not '
-                'name: write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
-                f'columns: {{{shares[0]}: {{effort_scale: 0.3}}}}']
+        return [f'{", ".join(shares)}: a share of a torque or force that the file does not name. '
+                'Write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
+                f'columns: {{{draft.drives[0]}: {{effort_scale: 0.3}}}}']
     factors = unlike_masses(model, recording) if any(
         isinstance(column, int) for column in efforts.values()) else {}
     scales = ', '.join(f'{drive}: {{effort_scale: {1 / factor:.3g}}}'
