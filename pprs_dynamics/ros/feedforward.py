@@ -47,7 +47,7 @@ from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
@@ -74,10 +74,8 @@ class FeedforwardNode(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
-        self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
-        self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         parameters = parameters_for(drive_count(self))
         self._settings = ModelParameters(
@@ -99,7 +97,6 @@ class FeedforwardNode(ManagedNode):
         self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
-        self._files = files_given(arguments)
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
@@ -127,18 +124,14 @@ class FeedforwardNode(ManagedNode):
             self, lambda: self._settings.node_values['command_timeout'], self._on_stale)
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
-        self._inputs = [
-            subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
-                         profile=SETPOINTS)
-            for topic, reader in self._readers.items()]
+        for topic, reader in self._readers.items():
+            self._until_cleanup(self.destroy_subscription, subscription(
+                self, reader.message, topic, partial(self._on_trajectory, reader),
+                profile=SETPOINTS))
         if JointTrajectoryControllerState is not None:
-            self._inputs.append(subscription(
+            self._until_cleanup(self.destroy_subscription, subscription(
                 self, JointTrajectoryControllerState, self._controller_topic,
                 only_whole(JointTrajectoryControllerState, self._on_controller)))
-
-    def _publisher(self, kind: type, topic: str) -> Any:
-        self._publishers_made.append(publisher(self, kind, topic))
-        return self._publishers_made[-1]
 
     def _create_parts(self) -> None:
         known = self._settings.model.knows_currents
@@ -155,15 +148,14 @@ class FeedforwardNode(ManagedNode):
                 self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
 
     def _destroy_topics(self) -> None:
-        for each in self._inputs:
-            self.destroy_subscription(each)
+        super()._destroy_topics()
         if self._watchdog is not None:
             self._watchdog.destroy()
-        for each in (*self._publishers_made, *self._parts.values(), self._current):
+        for each in (*self._parts.values(), self._current):
             if each is not None:
                 self.destroy_publisher(each)
         self._watchdog = self._current = None
-        self._inputs, self._publishers_made, self._parts = [], [], {}
+        self._parts = {}
 
     def _use_settings(self) -> None:
         node_values = self._settings.node_values
@@ -405,13 +397,11 @@ class FeedforwardNode(ManagedNode):
         lag = self._lag.summary()
         waits = (lag['p50'] or 0.0) > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
-            state=self.state, assumed=self._settings.model.assumed_at_start,
+            self._settings.facts, state=self.state, assumed=self._settings.model.assumed_at_start,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=lag,
-            lagging=bool(threshold and accepted > before and waits),
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
-            changes=len(self._settings.history or ()))
+            lagging=bool(threshold and accepted > before and waits))
 
 
 def _since(stamp: int) -> float:

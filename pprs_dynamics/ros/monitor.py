@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.qos import QoSProfile
-from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
@@ -36,8 +34,8 @@ from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
-from pprs_dynamics.ros.node.qos import EVERY_MESSAGE, LATCHED, publisher
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
+from pprs_dynamics.ros.node.qos import LATCHED
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.system.plain_text import for_json
 
@@ -82,8 +80,6 @@ class MonitorNode(ManagedNode):
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
         self._worker = DiagnosisWorker()
-        self._publishers_made: list[Any] = []
-        self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_described(overrides(self)):
             parameters = tuple(
@@ -99,7 +95,6 @@ class MonitorNode(ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
@@ -142,22 +137,16 @@ class MonitorNode(ManagedNode):
         self._all_joints = self._publisher(JointState, '~/joint_states_full')
         self._tf = self._publisher(TFMessage, '/tf') if TFMessage else None
         self._stream.listen()
-        self._clocks = [steady_timer(self, 1.0 / node_values['update_rate'], self._compare)]
+        clocks = [(1.0 / node_values['update_rate'], self._compare)]
         if node_values['diagnose_every']:
             self._diagnosis = self._publisher(String, '~/diagnosis', LATCHED)
-            self._clocks.append(steady_timer(self, LOOK, self._diagnose))
-
-    def _publisher(self, kind: type, topic: str, profile: QoSProfile = EVERY_MESSAGE) -> Any:
-        self._publishers_made.append(publisher(self, kind, topic, profile))
-        return self._publishers_made[-1]
+            clocks.append((LOOK, self._diagnose))
+        for period, callback in clocks:
+            self._until_cleanup(self.destroy_timer, steady_timer(self, period, callback))
 
     def _destroy_topics(self) -> None:
-        for clock in self._clocks:
-            self.destroy_timer(clock)
         self._stream.close()
-        for each in self._publishers_made:
-            self.destroy_publisher(each)
-        self._clocks, self._publishers_made = [], []
+        super()._destroy_topics()
 
     def _use(self) -> None:
         self._stream.use_model(self._settings.model)
@@ -234,9 +223,7 @@ class MonitorNode(ManagedNode):
         # The first window, and what is still on its way, is none that is missing.
         if came >= ENOUGH and compared > came:
             self._share = min(1.0, were / came)
-        self._status.facts.update(
-            compared_share=round(self._share, 3),
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint})
+        self._status.facts.update(self._settings.facts, compared_share=round(self._share, 3))
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""

@@ -46,7 +46,7 @@ from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
-from pprs_dynamics.ros.node.provenance import arguments_of, files_given, hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
@@ -84,7 +84,6 @@ class TrajectoryProxyNode(Node):
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
                                       hardware_of(self._settings.model), self._refresh)
-        self._files = files_given(arguments)
         self._refresh()
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
@@ -100,9 +99,7 @@ class TrajectoryProxyNode(Node):
         self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
 
     def _refresh(self) -> None:
-        self._status.facts.update(
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
-            changes=len(self._settings.history or ()))
+        self._status.facts.update(self._settings.facts)
 
     def _accept(self, goal: Any) -> GoalResponse:
         """Refuse a goal that breaks a rule, or asks for what the robot cannot do."""

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.joint_motion import DrivePath
 from pprs_dynamics.physics.model.limits import DriveLimits
 
 # [m, m/s, N, ...]: no drive's; with more, products with gains would overflow, and differences of
@@ -190,16 +191,10 @@ class DriveControl:
         following, T = self._following, self._after
         if following is None or following.position is None or following.velocity is None or T <= 0:
             return position + age * velocity, velocity
-        if age > T:
-            # The next one is taken at the next tick: until then the goal must not stand still.
-            return following.position + (age - T) * following.velocity, following.velocity
-        s = age / T
-        move = following.position - position
-        bend_0, bend_1 = T * velocity - move, move - T * following.velocity
-        goal = position + s * move + s * (1 - s) * ((1 - s) * bend_0 + s * bend_1)
-        speed = (move + (1 - 2 * s) * ((1 - s) * bend_0 + s * bend_1)
-                 + s * (1 - s) * (bend_1 - bend_0)) / T
-        return goal, speed
+        # The next one is taken at the next tick: until then the goal must not stand still.
+        path = DrivePath(np.array([0.0, T]), np.array([position, following.position]),
+                         np.array([velocity, following.velocity])).at(np.array([age]))
+        return path.position[0], path.velocity[0]
 
     def _as_late(self, speed: Array, measured: Array) -> Array:
         """Return the wanted velocity, delayed like the measured one.

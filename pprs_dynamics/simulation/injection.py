@@ -484,8 +484,7 @@ def _payload_mass(run: Injecting) -> Injected:
     mass, tool = share * float(robot.masses.sum()), engine.structure.tool
     centre = np.array([0.0, 0.0, 0.05])
     if isinstance(run.model, PlatformMechanism):
-        row, frame = engine.structure.links[tool]
-        centre = frame.inverse.of_point(robot.by_joint[row, 1:4] / robot.by_joint[row, 0])
+        centre = robot.centre_of(tool)
     engine.carry(tool, body_at(mass, tuple(centre), np.zeros((3, 3))))
     return None, {'mass': mass}
 
@@ -502,10 +501,8 @@ def _link_mass(run: Injecting) -> Injected:
 
     name, share = run.sizes(draw).values()
     for link in RODS if rods else (name,):
-        parameters = robot.inertial[robot.body_names.index(link)]
-        mass = share * float(parameters[0])
-        centre = engine.structure.links[link][1].inverse.of_point(parameters[1:4] / parameters[0])
-        engine.carry(link, body_at(mass, tuple(centre), np.zeros((3, 3))))
+        mass = share * float(robot.masses[robot.body_names.index(link)])
+        engine.carry(link, body_at(mass, tuple(robot.centre_of(link)), np.zeros((3, 3))))
     return None, {f'{name}.mass': mass}
 
 
@@ -554,15 +551,22 @@ def _payload_pick_up(run: Injection) -> Injected:
     return None, sizes
 
 
+def _passive_joints(run: Injection, effect: str, others: Mapping[str, tuple[str, ...]],
+                    ) -> Mapping[str, tuple[str, ...]]:
+    """Return passive joints by name; of a 3-PPRS all hinges under one, and others in addition."""
+    structure = run.model.robot.structure
+    if isinstance(run.model, PlatformMechanism):
+        return {'revolute': HINGES, **others}
+    found = {name: (name,) for name, (row, _) in structure.friction_rows.items()
+             if row >= 0 and name not in structure.drives}
+    if not found:
+        raise InjectedEffectError(f'{effect} needs a passive joint')
+    return found
+
+
 def _joint_friction(run: Injection) -> Injected:
     """Inject T w / sqrt(w^2 + w_0^2) in a passive joint, in all of a kind in a 3-PPRS."""
-    structure = run.model.robot.structure
-    groups = {'revolute': HINGES, 'spherical': BALLS} if isinstance(
-        run.model, PlatformMechanism) else {
-            name: (name,) for name, (row, _) in structure.friction_rows.items()
-            if row >= 0 and name not in structure.drives}
-    if not groups:
-        raise InjectedEffectError('joint_friction needs a passive joint')
+    groups = _passive_joints(run, 'joint_friction', {'spherical': BALLS})
     closed = run.engine.closed(run.motion)
 
     def rows_of(name: str) -> Array:
@@ -589,12 +593,8 @@ def _joint_friction(run: Injection) -> Injected:
 
 def _joint_spring(run: Injection) -> Injected:
     """Inject k x (1 + (x / x_h)^2), x = u - u_0, in a passive joint, in all hinges of a 3-PPRS."""
-    structure, closed = run.model.robot.structure, run.engine.closed(run.motion)
-    groups = {'revolute': HINGES} if isinstance(run.model, PlatformMechanism) else {
-        name: (name,) for name in structure.rows if name not in structure.drives
-        and name in structure.friction_rows}
-    if not groups:
-        raise InjectedEffectError('joint_spring needs a passive joint')
+    groups = _passive_joints(run, 'joint_spring', {})
+    closed = run.engine.closed(run.motion)
 
     def draw() -> dict[str, Any]:
         name = str(run.random.choice(list(groups)))

@@ -9,6 +9,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from pprs_command import pprs
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.app.report import terminal
 from pprs_dynamics.app.report.terminal import as_text, shell_command, stacked, verdict_panel
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -123,3 +125,14 @@ def test_sentences_wrap_between_words_and_commands_stay_on_one_line() -> None:
     text = [line.strip('│ ') for line in lines if command not in line and '─' not in line]
     assert max(map(len, text)) <= 80
     assert ' '.join(' '.join(text).split()) == ' '.join(f'{sentence}{sentence}'.split())
+
+
+def test_long_work_leaves_lines_in_a_log(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(terminal, 'LOGGED_EVERY', 0.02)
+    screen = terminal.console()
+    with terminal.staged_bar(screen) as show:
+        show('diagnosing', 0.3)
+        time.sleep(0.2)
+    assert 'diagnosing 30% after 0 s' in capsys.readouterr().err.splitlines()

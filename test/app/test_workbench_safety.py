@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import socket
+import struct
 import subprocess
 import time
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from workbench_server import Workbench, workbench
 from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
 from pprs_dynamics.app.workbench.server.offered import NotOfferedError, Offered
 
+AT_ONCE = struct.pack('ii', 1, 0)  # closes with a reset
 SECRET = 'no business of a browser'
 
 
@@ -239,15 +241,23 @@ def test_a_port_that_is_taken_is_one_line(bench: Workbench) -> None:
     assert f'127.0.0.1:{bench.port}: cannot be listened on' in done.stderr
 
 
-def test_a_browser_that_goes_away_in_an_upload_leaves_no_traceback(
+def test_clients_that_go_away_in_the_middle_leave_no_traceback(
     bench: Workbench, folder: Path,
 ) -> None:
-    head = (f'POST /api/upload?name=x.csv HTTP/1.1\r\nHost: {bench.host}\r\n'
-            f'Origin: http://{bench.host}\r\nCookie: {bench.cookie}\r\n'
-            'Content-Type: application/octet-stream\r\nContent-Length: 1000\r\n\r\n')
-    with socket.create_connection(('127.0.0.1', bench.port)) as client:
-        client.sendall(head.encode() + b'time,')
-        time.sleep(0.3)
+    head = (f'HTTP/1.1\r\nHost: {bench.host}\r\nOrigin: http://{bench.host}\r\n'
+            f'Cookie: {bench.cookie}\r\n')
+    body = 'Content-Type: {}\r\nContent-Length: 1000\r\n\r\n{}'
+    requests = [f'GET {path} {head}\r\n' for path in PATHS] + [
+        f'GET {PATHS[1]} HT', f'GET {PATHS[1]} {head}',
+        f'POST /api/upload?name=x.csv {head}' + body.format('application/octet-stream', 'time,'),
+        f'POST /api/tick {head}' + body.format('application/json', '{"effect":')]
+    for request in requests:
+        for is_reset in (False, True):
+            with socket.create_connection(('127.0.0.1', bench.port)) as client:
+                client.sendall(request.encode())
+                time.sleep(0.05)
+                if is_reset:
+                    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, AT_ONCE)
     time.sleep(0.5)
     assert bench.get('/api/files').status == 200
     assert 'Traceback' not in (folder / 'workbench.log').read_text()

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import gzip
 import json
+import shutil
 from pathlib import Path
 
 import made_up_arm as arm
 import numpy as np
 import pytest
+from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
@@ -47,6 +49,34 @@ def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Pa
         assert fit.model.values[key] == pytest.approx(arm.FRICTION[key], rel=0.03)
     assert max(fit.held_out.values()) < 1.1 * NOISE
     assert min(fit.before.values()) > 5 * NOISE
+
+
+def test_a_slide_of_init_is_fitted_as_well_and_diagnosed_without_another_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copy(Path(__file__).parents[2] / 'config' / 'single_axis.urdf', tmp_path / 'axis.urdf')
+    runs = [str(tmp_path / f'{name}.csv') for name in ('first', 'second', 'third')]
+    upright = {'robot.gravity': (0.0, 0.0, -9.81)}
+    real = axis(**{'links.mass': (90.0,), **upright})
+    for seed, run in enumerate(runs):
+        write_recording(run, axis_recording(real, seed))
+    model, base = str(tmp_path / 'axis.yaml'), str(tmp_path / 'base.yaml')
+    assert main(['init', str(tmp_path / 'axis.urdf'), *runs[:1], '--output', model]) == 0
+    assert main(['diagnose', runs[0], '--model', model, '--as-it-is']) == 0
+    assert 'pprs fit' in capsys.readouterr().out
+    assert main(['fit', *runs[:2], '--model', model, '--output', base]) == 0
+    fitted = DriveModel.load(base)
+    assert fitted.values['friction.viscous'] == pytest.approx((40.0,), rel=0.03)
+    assert fitted.values['friction.coulomb'] == pytest.approx((6.0,), rel=0.03)
+    mass = fitted.values['links.mass'][0] + fitted.values['robot.armature'][0]
+    assert mass == pytest.approx(90.0, rel=0.01)
+    capsys.readouterr()
+    assert main(['diagnose', runs[2], '--model', base]) == 0
+    assert 'pprs fit' not in capsys.readouterr().out
+    # Nor where the model explains little of another machine.
+    write_recording(runs[2], axis_recording(axis(**{'links.mass': (5.0,), **upright}), 3))
+    assert main(['diagnose', runs[2], '--model', base, '--as-it-is']) == 0
+    assert 'pprs fit' not in capsys.readouterr().out
 
 
 def test_the_base_is_fitted_again_beside_an_effect_that_it_held(tmp_path: Path) -> None:

@@ -100,6 +100,8 @@ TITLES = {  # of a quantity: its columns, and their multiple of SI
     'compounds': {'q': ('Gelenkwinkel {}', 1.0), 'tau': ('Gelenkmoment {}', 1.0)},
     'compounds with roles': {'x': ('Lagesollwert {}', 1.0), 'q': ('Lageistwert {}', 1.0),
                              'v': ('Drehzahlistwert {}', 1.0), 'tau': ('Momentenistwert {}', 1.0)},
+    'short words with roles': {'x': ('tausoll{}', 1.0), 'q': ('qist{}', 1.0),
+                               'tau': ('tauist{}', 1.0)},
     'blanks and quotes': {'q': (' "q {}"', 1.0), 'tau': (' "tau {}"', 1.0)},
 }
 
@@ -287,3 +289,10 @@ def test_a_recording_that_cannot_be_checked_is_a_question(
     time, q, _, effort = run_of_arm()
     assert 'it fails' in ''.join(asked_about(
         tmp_path, 't,q1,q2,tau1,tau2', time, q, effort).questions)
+
+
+@pytest.mark.parametrize('head', ['t,q1,q2,tau_ref1,tau_ref2', 't,q_cmd1,q_cmd2,tau1,tau2'])
+def test_commands_alone_are_a_question(head: str, tmp_path: Path) -> None:
+    time, q, _, effort = run_of_arm()
+    assert 'commands by their names' in ''.join(asked_about(
+        tmp_path, head, time, q, effort).questions)

@@ -14,7 +14,6 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import (
-    exact_forces,
     fitted_model,
     linear_prediction,
     next_operating_point,
@@ -65,7 +64,7 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     found, last = row.fitted, row.fits
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
-    exact = exact_forces(last.design, fitted_model(last, found))
+    exact = last.design.exact_forces(fitted_model(last, found))
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 

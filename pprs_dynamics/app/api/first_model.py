@@ -26,6 +26,7 @@ from pprs_dynamics.inference.readings.columns import (
 )
 from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
 from pprs_dynamics.inference.readings.table import (
+    COMMANDS,
     CURRENT,
     EFFORT,
     POSITION,
@@ -54,7 +55,13 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
-from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS, EXTERNAL, MEASURED
+from pprs_dynamics.physics.model.recorded_names import (
+    COMMANDED,
+    EFFORT_KIND,
+    EFFORT_KINDS,
+    EXTERNAL,
+    MEASURED,
+)
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
@@ -89,34 +96,107 @@ class Names:
     prefix: str = ''
 
 
-@dataclass(frozen=True)
+@dataclass
 class FirstModel:
     """A model file that is to be written.
 
     Parameters
     ----------
-    path : Path
-        Where it will stand, from which the description's path counts.
-    text : str
-        Its content, with comments.
-    model : DriveModel
-        The same, built.
-    notes : tuple of str
-        What was guessed, and what could not be known.
-    recordings : tuple of Path
+    robot, path : Path
+        The description, and the model file.
+    is_mjcf : bool
+    description : Description
+    base : str
+    branch : Branch
+    drives : tuple of str
+    names : Names
+    recordings : list of Path
         As they are given to commands: of several files that make one, their folder or the first.
-    has_efforts : bool
-    questions : tuple of str
+    notes : list of str
+        What was guessed, and what could not be known.
+    columns : dict
+        Content of the key `columns`.
+    guessed : list of str
+        Comments on `columns`.
+    questions : list of str
         Where a reading is not sure: lines, of which one is to be written.
+    kinds : set of str
+        Quantities that are recorded.
     """
 
+    robot: Path
     path: Path
-    text: str
-    model: DriveModel
-    notes: tuple[str, ...]
-    recordings: tuple[Path, ...]
-    has_efforts: bool
-    questions: tuple[str, ...] = ()
+    is_mjcf: bool
+    description: Description
+    base: str
+    branch: Branch
+    drives: tuple[str, ...]
+    names: Names
+    recordings: list[Path]
+    notes: list[str]
+    columns: dict[str, Any] = field(default_factory=dict)
+    guessed: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
+    kinds: set[str] = field(default_factory=set)
+
+    @property
+    def has_efforts(self) -> bool:
+        """Whether efforts of the drives are recorded."""
+        return bool({EFFORT, CURRENT} & self.kinds) and EXTERNAL not in self.kinds
+
+    @property
+    def model(self) -> DriveModel:
+        """The model of the file."""
+        return DriveModel.from_parameters(parse_parameters(self.text, self.path),
+                                          source=str(self.path))
+
+    @property
+    def text(self) -> str:
+        """Content of the file."""
+        place = os.path.relpath(self.robot.resolve(), self.path.resolve().parent)
+        slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
+        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
+        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
+        names = [recording.name for recording in self.recordings[:3]]
+        read_with = f', read with {", ".join(names)}' if names else ''
+        lines = [
+            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
+            'be checked.',
+            '/**:',
+            '  ros__parameters:',
+            '    robot:',
+            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
+            'this file',
+            f'      base: {scalar(self.base)}  # the link that does not move',
+            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
+            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
+            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
+            'recorded efforts are currents',
+            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
+            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
+            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
+            'where ripple is looked for',
+            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
+              for loop in self.description.loops),
+            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
+            + ', '.join(EFFORT_KINDS),
+            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
+        ]
+        renamed = {drive: self.names.joints[drive] for drive in self.drives
+                   if self.names.joints.get(drive, drive) != drive}
+        if self.names.prefix:
+            first = self.drives[0]
+            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
+                         f'{first} {self.names.prefix}{first}')
+        elif renamed:
+            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
+        if self.columns:
+            lines += ['    columns:  # of tables: names, or numbers from 1',
+                      *(f'      # guessed: {note}' for note in self.guessed),
+                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
+                        for key, value in self.columns.items())]
+        lines += [f'    # not sure: {question}' for question in self.questions]
+        return '\n'.join(lines) + '\n'
 
 
 def first_model(
@@ -171,8 +251,8 @@ def first_model(
         by_numbers = not all(map(_is_short_for, names.joints, names.joints.values()))
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
-    draft = _Draft(path, Path(output), is_mjcf, description, base or root_of(description), branch,
-                   chosen, names, [file.name for file in given])
+    draft = FirstModel(path, Path(output), is_mjcf, description, base or root_of(description),
+                       branch, chosen, names, given, notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
@@ -181,7 +261,6 @@ def first_model(
             notes.append(str(error))
             draft.questions += error.lines
         notes += draft.guessed
-    has_efforts = bool({EFFORT, CURRENT} & draft.kinds) and EXTERNAL not in draft.kinds
     if given and not draft.questions:
         notes += _correct(draft, given[0])
     if by_numbers:
@@ -190,14 +269,13 @@ def first_model(
             f'recording of this robot, keep joint_map: {_yaml(names.joints)}')
     if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
-                     f'{draft.output.name}')
-    if given and not has_efforts and EXTERNAL not in draft.kinds:
+                     f'{draft.path.name}')
+    if given and not draft.has_efforts and EXTERNAL not in draft.kinds:
         notes.append('no efforts were found: compare, diagnose and fit need them')
-    return FirstModel(draft.output, draft.text, draft.model, tuple(notes), tuple(given),
-                      has_efforts, tuple(draft.questions))
+    return draft
 
 
-def _correct(draft: _Draft, path: Path) -> list[str]:
+def _correct(draft: FirstModel, path: Path) -> list[str]:
     """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
     A kind of mistake that comes again after its correction is a question.
@@ -219,7 +297,7 @@ def _correct(draft: _Draft, path: Path) -> list[str]:
                 each.what + (f': if so, write {line}' if line else '') for each in readings
                 for line in [each.line or columns_line([each])]]
             if not any(each.kind.startswith(('effort', 'drive_constant')) for each in readings):
-                draft.questions += _unit_questions(draft, model, recording)
+                draft.questions += _questions_of_names(draft, model, recording)
             return notes + draft.questions
         for each in sure:
             corrected.add(each.kind)
@@ -229,16 +307,22 @@ def _correct(draft: _Draft, path: Path) -> list[str]:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
-def _unit_questions(draft: _Draft, model: DriveModel, recording: Recording) -> list[str]:
-    """Return questions about efforts whose unit a file does not say: shares, and numbers alone."""
+def _questions_of_names(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
+    """Return questions about commands, and about efforts whose unit a file does not say."""
     efforts = {drive: column for drive in draft.drives
                if (column := draft.columns.get(drive, {}).get(EFFORT)) is not None}
-    shares = [drive for drive, column in efforts.items() if isinstance(column, str)
-              and f'<{SHARE}>' in words_of(column)]
+    chosen = [column for drive in draft.drives for kind in (POSITION, EFFORT) if isinstance(
+        column := draft.columns.get(drive, {}).get(kind), str)]
+    commands = [column for column in chosen if {*words_of(column)} & COMMANDS]
+    if commands:
+        return [f'{", ".join(commands)}: commands by their names, where the measured columns are '
+                'not known. Write their names in place of these, or, if no effort was measured, '
+                f'{EFFORT_KIND}: {COMMANDED}']
+    shares = [column for column in chosen if f'<{SHARE}>' in words_of(column)]
     if shares:
-        return [f'{efforts[shares[0]]} is a share of a torque or force that the file does not '
-                'name: write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
-                f'columns: {{{shares[0]}: {{effort_scale: 0.3}}}}']
+        return [f'{", ".join(shares)}: a share of a torque or force that the file does not name. '
+                'Write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
+                f'columns: {{{draft.drives[0]}: {{effort_scale: 0.3}}}}']
     factors = unlike_masses(model, recording) if any(
         isinstance(column, int) for column in efforts.values()) else {}
     scales = ', '.join(f'{drive}: {{effort_scale: {1 / factor:.3g}}}'
@@ -489,97 +573,6 @@ def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 # -------------------------------------------------------------------------------------- text
-
-
-@dataclass
-class _Draft:
-    """What is known of a model file that is being written.
-
-    Parameters
-    ----------
-    robot, output : Path
-        The description, and the model file.
-    is_mjcf : bool
-    description : Description
-    base : str
-    branch : Branch
-    drives : tuple of str
-    names : Names
-    recordings : list of str
-    columns : dict
-        Content of the key `columns`.
-    guessed, questions : list of str
-        Comments.
-    kinds : set of str
-        Quantities that are recorded.
-    """
-
-    robot: Path
-    output: Path
-    is_mjcf: bool
-    description: Description
-    base: str
-    branch: Branch
-    drives: tuple[str, ...]
-    names: Names
-    recordings: list[str]
-    columns: dict[str, Any] = field(default_factory=dict)
-    guessed: list[str] = field(default_factory=list)
-    questions: list[str] = field(default_factory=list)
-    kinds: set[str] = field(default_factory=set)
-
-    @property
-    def model(self) -> DriveModel:
-        """The model of the file."""
-        return DriveModel.from_parameters(parse_parameters(self.text, self.output),
-                                          source=str(self.output))
-
-    @property
-    def text(self) -> str:
-        """Content of the file."""
-        place = os.path.relpath(self.robot.resolve(), self.output.resolve().parent)
-        slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
-        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
-        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
-        read_with = f', read with {", ".join(self.recordings[:3])}' if self.recordings else ''
-        lines = [
-            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
-            'be checked.',
-            '/**:',
-            '  ros__parameters:',
-            '    robot:',
-            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
-            'this file',
-            f'      base: {scalar(self.base)}  # the link that does not move',
-            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
-            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
-            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
-            'recorded efforts are currents',
-            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
-            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
-            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
-            'where ripple is looked for',
-            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
-              for loop in self.description.loops),
-            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
-            + ', '.join(EFFORT_KINDS),
-            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
-        ]
-        renamed = {drive: self.names.joints[drive] for drive in self.drives
-                   if self.names.joints.get(drive, drive) != drive}
-        if self.names.prefix:
-            first = self.drives[0]
-            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
-                         f'{first} {self.names.prefix}{first}')
-        elif renamed:
-            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
-        if self.columns:
-            lines += ['    columns:  # of tables: names, or numbers from 1',
-                      *(f'      # guessed: {note}' for note in self.guessed),
-                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
-                        for key, value in self.columns.items())]
-        lines += [f'    # not sure: {question}' for question in self.questions]
-        return '\n'.join(lines) + '\n'
 
 
 def _comment(key: str, value: Any) -> str:

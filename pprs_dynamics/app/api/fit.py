@@ -83,7 +83,7 @@ class FitResult(Result):
 def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
         topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
         ) -> FitResult:
-    """Fit a base model: an arm's inertia and friction, or what `tolerances` leave open.
+    """Fit a base model: inertia and friction, or what `tolerances` leave open; see `fit_base`.
 
     Parameters
     ----------

@@ -54,38 +54,39 @@ def run(options: argparse.Namespace) -> int:
     first = first_model(options.robot, options.recordings, options.output, base=options.base,
                         tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)
-    for line in mechanism_lines(first.model) if first.model.moves_joints else ():
+    model = first.model
+    for line in mechanism_lines(model) if model.moves_joints else ():
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')
-    if first.model.recorded.columns is None and first.questions:
+    if model.recorded.columns is None and first.questions:
         screen.print('[bold]Not sure[/]: write one of these lines into the model file')
         for line in first.questions:
             screen.print(f'  {shown(line)}')
         return 1
-    recordings, summaries = show_recordings(first.model, list(map(str, first.recordings)), None,
+    recordings, summaries = show_recordings(model, list(map(str, first.recordings)), None,
                                             screen)
     if options.picture and recordings:
         save(plot_over_time(recordings[0].time, recording_rows(
-            recordings[0], first.model.units)), options.picture)
+            recordings[0], model.units)), options.picture)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
-    model = quote(options.output)
+    file = quote(options.output)
     if first.has_efforts:
         screen.print('[bold]Next[/] Fit the model, then diagnose another run:')
-        screen.print(shell_command(f'pprs fit {names} --model {model} --output base.yaml'))
+        screen.print(shell_command(f'pprs fit {names} --model {file} --output base.yaml'))
         screen.print(shell_command(f'pprs diagnose {names} --model base.yaml'))
         screen.print('A fault of the robot becomes part of the model that is fitted to it: fit a '
                      'healthy run without load, and diagnose another one.')
     else:
         screen.print('[bold]Next[/] See what the recording contains:')
-        screen.print(shell_command(f'pprs info {names} --model {model}'))
+        screen.print(shell_command(f'pprs info {names} --model {file}'))
     if options.json:
         write_json(options.json, {
-            'model': options.output, 'notes': list(first.notes),
-            'drives': list(first.model.drives),
+            'model': options.output, 'notes': first.notes,
+            'drives': list(model.drives),
             'recordings': [asdict(summary) for summary in summaries],
-            'questions': list(first.questions)})
+            'questions': first.questions})
     if first.questions:
         screen.print('[bold]Not sure[/]: the lines are comments in the model file; write what is '
                      'true, or go on with --as-it-is')

@@ -41,7 +41,8 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
                            options.topic, progress, whole, getattr(options, 'as_it_is', False))
     for recording in (*inputs.fitted, *inputs.held_out):
-        for finding in recording.findings:
+        # That velocities are computed is no fault; `pprs info` says so.
+        for finding in (each for each in recording.findings if each.kind != 'missing_velocity'):
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
     return inputs
 

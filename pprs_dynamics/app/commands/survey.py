@@ -14,7 +14,7 @@ from pprs_dynamics.app.fleet.engine import cluster, run_each
 from pprs_dynamics.app.fleet.recordings import find_recordings, pandas, read_manifest
 from pprs_dynamics.app.fleet.store import AUTO, write_rows
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine, key, model_of, requests_of
-from pprs_dynamics.app.report.terminal import console, counting_bar, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.system.plain_text import counted
 
 MOST_SHOWN = 10  # errors
@@ -58,14 +58,14 @@ def run(options: argparse.Namespace) -> int:
     waiting = [job for job in jobs if not (store / f'{key(job.common)}.parquet').exists()]
     failed: dict[str, str] = {}
     with (cluster(options.workers, options.scheduler) as client,
-          counting_bar(screen, 'recordings', len(waiting)) as advance):
-        for job, rows, error in run_each(client, examine, waiting):
+          staged_bar(screen) as progress):
+        for done, (job, rows, error) in enumerate(run_each(client, examine, waiting), start=1):
             if error is None:
                 write_rows(store, key(rows[0]), rows)
                 error = rows[0].get('error')
             if error is not None:
                 failed[job.entry.path] = error
-            advance()
+            progress(f'recordings: {done} of {len(waiting)}', done / len(waiting))
     for path, error in list(failed.items())[:MOST_SHOWN]:
         screen.print(f'[yellow]![/] {shown(path)}: {shown(error)}')
     if len(failed) > MOST_SHOWN:

@@ -24,10 +24,9 @@ HIGH = 0.5  # use of a limit, from which on it is shown
 
 def contests_table(experiment: Experiment) -> PlainTable:
     """Return pairs of effects with their evidence, now and expected."""
-    return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
+    return ('if the truth is', 'and the rival', 'now', 'expected', 'chance'), [
         (contest.truth, contest.rival, f'{contest.evidence_now:.0f}',
-         f'{contest.expected_evidence:.0f}',
-         f'{contest.probability:.0%}')
+         f'{contest.expected_evidence:.0f}', f'{contest.probability:.0%}')
         for contest in experiment.contests]
 
 
@@ -53,7 +52,8 @@ def experiment_view(experiment: Experiment) -> Any:
     """Return what a motion is for, what it promises, and which limits it uses."""
     parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
     if experiment.contests:
-        parts.append(titled_table('Expected evidence', contests_table(experiment), right=()))
+        parts.append(titled_table('Evidence, now and expected', contests_table(experiment),
+                                  right=()))
     if experiment.accuracies:
         headings, rows = accuracies_table(experiment)
         parts.append(titled_table('Standard deviations of parameters, now and after this motion',

@@ -154,58 +154,31 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
 
     In a terminal a bar for each stage, elsewhere a line on stderr every ten seconds.
     """
-    from rich import progress
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     stage, furthest = 'starting', 0.0
-    with _bar(console, lambda: f'{stage} {furthest:.0%}', progress.TaskProgressColumn(),
-              progress.TimeElapsedColumn()) as bar:
-        task = bar.add_task(stage, total=1.0, visible=False)
-
-        def advance(what: str, share: float) -> None:
-            nonlocal stage, furthest
-            if what != stage:
-                bar.reset(task, description=what, visible=True)
-                stage, furthest = what, 0.0
-            furthest = max(furthest, share)  # a bar never goes back
-            bar.update(task, completed=furthest)
-
-        yield advance
-
-
-@contextmanager
-def counting_bar(console: Any, what: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show count and remaining time as `staged_bar`; call the given function for each done."""
-    from rich import progress
-
-    done = 0
-    with _bar(console, lambda: f'{done} of {total} {what}', progress.MofNCompleteColumn(),
-              progress.TimeRemainingColumn()) as bar:
-        task = bar.add_task(what, total=total)
-
-        def advance() -> None:
-            nonlocal done
-            done += 1
-            bar.update(task, advance=1)
-
-        yield advance
-
-
-@contextmanager
-def _bar(console: Any, state: Callable[[], str], *columns: Any) -> Iterator[Any]:
-    """Give rich's progress; without a terminal print the state on stderr every ten seconds."""
-    from rich.progress import BarColumn, Progress, TextColumn
-
     began, over = monotonic(), Event()
+
+    def advance(what: str, share: float) -> None:
+        nonlocal stage, furthest
+        if what != stage:
+            bar.reset(task, description=what, visible=True)
+            stage, furthest = what, 0.0
+        furthest = max(furthest, share)  # a bar never goes back
+        bar.update(task, completed=furthest)
 
     def log() -> None:
         while not over.wait(LOGGED_EVERY):
-            print(f'{state()} after {monotonic() - began:.0f} s', file=sys.stderr, flush=True)
+            print(f'{stage} {furthest:.0%} after {monotonic() - began:.0f} s', file=sys.stderr,
+                  flush=True)
 
-    with Progress(TextColumn('{task.description}', markup=False), BarColumn(), *columns,
-                  console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(TextColumn('{task.description}', markup=False), BarColumn(),
+                  TaskProgressColumn(), TimeElapsedColumn(), console=console, transient=True,
+                  disable=not console.is_terminal) as bar:
+        task = bar.add_task(stage, total=1.0, visible=False)
         if not console.is_terminal:
             Thread(target=log, daemon=True).start()
         try:
-            yield bar
+            yield advance
         finally:
             over.set()

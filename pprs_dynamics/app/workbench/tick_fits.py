@@ -26,7 +26,6 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component, E
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import (
-    exact_forces,
     fitted_model,
     linear_residual,
     linearised,
@@ -221,14 +220,6 @@ class TickFits:
         """Return a set under the noise of another: linear, in milliseconds."""
         return self.fits.at_noise_of(near, tuple(candidates))
 
-    def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
-        """Return a set with its own noise."""
-        return self.fits.evaluate(tuple(candidates))
-
-    def refined(self, found: CandidateSet) -> CandidateSet:
-        """Return the set with all shapes where the cost is lowest."""
-        return self.fits.refined(found)
-
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
         """Return a set with the linear parameters that somebody chose; all else follows."""
         blocks: list[Block] = []
@@ -292,4 +283,4 @@ class TickFits:
             fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
-        return Exact(model, self.measured - exact_forces(fits.design, model), parameters)
+        return Exact(model, self.measured - fits.design.exact_forces(model), parameters)

@@ -153,14 +153,14 @@ def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision:
 
 def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
     """Yield what follows: the noise fitted, what others would gain, shapes, the model itself."""
-    free = fits.fitted([tick.best for tick in view.ticks.values()])
+    free = fits.fits.evaluate(tuple(tick.best for tick in view.ticks.values()))
     view = _fitted(fits, view, free, FITTED)
     yield view
     view = replace(view, offers=fits.offers(view.free), has_offers=True)
     yield view
     if not view.ticks:
         return
-    refined = fits.refined(free)
+    refined = fits.fits.refined(free)
     if refined is not free:
         ticks = {c.name: replace(view.ticks[c.name], best=c) for c in refined.effects}
         view = _fitted(fits, replace(view, ticks=ticks), refined, REFINED)
@@ -180,8 +180,8 @@ def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
 def _fitted(fits: TickFits, view: ViewState, free: CandidateSet, stage: str) -> ViewState:
     without = {}
     for candidate in free.effects:
-        rest = [effect for effect in free.effects if effect is not candidate]
-        without[candidate.name] = fits.fitted(rest).terms - free.terms
+        rest = tuple(effect for effect in free.effects if effect is not candidate)
+        without[candidate.name] = fits.fits.evaluate(rest).terms - free.terms
     free = fits.at(free.effects, free)
     found = _with_chosen(fits, free, view.ticks)
     residual = fits.residual(found) if view.ticks else fits.before

@@ -106,7 +106,7 @@ def adopt(
             found = _with_effect(case, request)
         except (ModelError, EffectRequestError) as error:
             force = False
-            found = case.adoption(request, model, 2 * case.residuals(recordings, model), None, (
+            found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
@@ -154,13 +154,13 @@ class _Case:
 
     @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
                   'held out')
-    def objections(self, gain: PredictiveGain, errors: Sequence[float], where: str,
+    def objections(self, gain: PredictiveGain | None, errors: Sequence[float], where: str,
                    unit: str) -> tuple[str, ...]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
 
         Parameters
         ----------
-        gain : PredictiveGain
+        gain : PredictiveGain or None
             Of the model with the effect.
         errors : (before, after)
             Over all drives [N].
@@ -171,6 +171,8 @@ class _Case:
         """
         asked = FURTHER_ERRORS if any(
             isinstance(effect, CatalogueEffect) for effect in self.model.effects) else FIRST_ERRORS
+        if gain is None:
+            return (f'the error on {where} cannot be computed',)
         if gain.confirms(asked):
             return ()
         why = (f'on {listed(gain.losing)} it rises for certain' if gain.losing else
@@ -178,9 +180,9 @@ class _Case:
         return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
-                 residuals: Sequence[Residuals],
-                 on_blocks: tuple[float, float, PredictiveGain] | None,
-                 objections: tuple[str, ...], **details: Any) -> Adoption:
+                 residuals: Sequence[Residuals], held_out: Sequence[float],
+                 gain: PredictiveGain | None, objections: tuple[str, ...], **details: Any,
+                 ) -> Adoption:
         """Return the undecided adoption of a model, with all objections.
 
         Parameters
@@ -189,29 +191,28 @@ class _Case:
         after : DriveModel
         residuals : (before, after)
             On the recordings.
-        on_blocks : (before, after, PredictiveGain) or None
-            Errors on held-out blocks of the recordings [N], and the gain there; unused where
-            there are validation recordings. None where the effect gives no model.
+        held_out : (before, after)
+            Errors on blocks of the recordings [N]; on validation recordings they are computed.
+        gain : PredictiveGain or None
+            On held-out data.
         objections : tuple of str
         details
             Further fields of the adoption.
         """
         before, with_it = residuals
-        errors = held_out = [rms(before), rms(with_it)]
+        errors = [rms(before), rms(with_it)]
         if self.validate:
-            held = self.residuals(self.validate, self.model, after)
-            on_blocks = (rms(held[0]), rms(held[1]), predictive_gain(*held))
-        if on_blocks is not None:
-            *held_out, gain = on_blocks
-            if after is not self.model:
-                objections += (
-                    self.objections(predictive_gain(before, with_it), errors, 'the recordings',
-                                    before.unit)
-                    or self.objections(gain, held_out, self.held_out, before.unit))
+            held_out = [rms(each) for each in self.residuals(self.validate, self.model, after)]
+        if after is not self.model:
+            objections += (
+                self.objections(predictive_gain(before, with_it), errors, 'the recordings',
+                                before.unit)
+                or self.objections(gain, held_out, self.held_out, before.unit))
+        first, last = held_out or errors
         return Adoption(**{
             'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
-            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': held_out[0],
-            'held_out_after': held_out[1], 'held_out_on': VALIDATION if self.validate else BLOCKS,
+            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': first,
+            'held_out_after': last, 'held_out_on': VALIDATION if self.validate else BLOCKS,
             'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
             'reference': () if self.reference is None else self.reference.names, **details})
 
@@ -230,7 +231,7 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     table, name = case.diagnosis.selection, request.name
     assert table is not None
     row = requested_row(table, request)
-    answer = Answer(table, row, ())
+    answer = Answer(table, row, case.validate)
     candidate = next(c for c in row.effects if c.name == name)
     effect = answer.found(candidate)
     after, gone = requested_model(answer, request, effect)
@@ -256,31 +257,17 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                        'were tried')
     if others:
         remarks.append(f'The recordings also show {listed(others)}')
+    # The new model has this effect alone, in the value that it has beside the others.
+    held_out = [] if case.validate else [
+        hold_out(row.fits, row.fitted, only).error for only in ((), candidate.components)]
     prefix = f'effects.{name}.'
     return case.adoption(
-        request, after, residuals, _on_blocks(case, row, candidate), tuple(objections),
-        drives=effect.drives, remarks=tuple(remarks), rivals=rivals,
-        moments=effect.moments, parameters={
+        request, after, residuals, held_out, effect.gain, tuple(objections), drives=effect.drives,
+        remarks=tuple(remarks), rivals=rivals, moments=effect.moments, parameters={
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
             answer.fits, answer.fitted) if number.after != number.before))
-
-
-def _on_blocks(case: _Case, row: Row, candidate: EffectCandidate,
-               ) -> tuple[float, float, PredictiveGain] | None:
-    """Return held-out errors without an effect and with it alone, as the model gets it.
-
-    None where validation recordings decide.
-    """
-    table = case.diagnosis.selection
-    if case.validate or table is None:
-        return None
-    if row.fitted.candidates != (candidate,):
-        row = Row.exact(table.first, table.first.evaluate((candidate,)))
-    without, alone = (hold_out(row.fits, fitted) for fitted in (
-        row.fits.at_noise_of(row.fitted, ()), row.fitted))
-    return without.error, alone.error, without.gain(alone)
 
 
 def requested_row(table: ModelTable, request: EffectRequest) -> Row:
@@ -425,11 +412,11 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
     start, _ = measure_residuals(bare, case.recordings)
     fitted = fit_curve(start, request)
     after = with_curve(bare, drive, fitted)
-    on_blocks = None
-    if not case.validate:
-        found = held_out_residuals(
+    if case.validate:
+        given, found = (measure_residuals(each, case.validate)[0] for each in (bare, after))
+    else:
+        given, found = start, held_out_residuals(
             start, request, lambda share: report(DIAGNOSED + (1 - DIAGNOSED) * share))
-        on_blocks = rms(start), rms(found), predictive_gain(start, found)
     count = len(model.drives)
     # Chosen among the curves of every drive over every variable.
     evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))
@@ -444,6 +431,7 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
         remarks.append(f'The recordings also show {others}: adopt causes first, a curve in their '
                        'place is valid for this motion only')
     return case.adoption(
-        request, after, case.residuals(case.recordings, model, after), on_blocks, against,
+        request, after, case.residuals(case.recordings, model, after), (rms(given), rms(found)),
+        predictive_gain(given, found), against,
         parameters=fitted.parameters(drive, start.units_of(drive).effort), curve=fitted,
         remarks=tuple(remarks))

@@ -42,7 +42,6 @@ from pprs_dynamics.inference.search.estimates import (
 )
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.fitted_model import (
-    exact_forces,
     linear_error,
     linear_residual,
     model_at,
@@ -115,8 +114,8 @@ class Answer:
         """Return measured minus what the reported model predicts, (M, D) [N]."""
         if self.fitted.is_dated:
             return linear_residual(self.fits, self.fitted)
-        remaining = self.given.measured - exact_forces(
-            self.design, self.adopted) - self.design.carried_forces(self.fitted.fit.coefficients)
+        remaining = self.given.measured - self.design.exact_forces(
+            self.adopted) - self.design.carried_forces(self.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
             remaining[:, d] -= series.open_forces(remaining[:, d])
         return remaining

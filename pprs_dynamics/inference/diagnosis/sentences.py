@@ -258,7 +258,7 @@ def _headline(diagnosis: Diagnosis) -> str:
     effects, unit = diagnosis.effects, diagnosis.residuals.unit
     if diagnosis.effort_looks_like:
         what = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
-        return f'{" ".join(map(sentence, what))} No effect is reported.'
+        return f'{sentence("; ".join(what))} No effect is reported.'
     if diagnosis.stick_slip:
         drives = listed([f'{drive} at {slip.frequency:.2g} Hz'
                          for drive, slip in diagnosis.stick_slip.items()])
@@ -282,13 +282,13 @@ def _headline(diagnosis: Diagnosis) -> str:
         places += [f'in {len(groups) - 2} more place{"s" * (len(groups) > 3)}'] * (len(groups) > 2)
         return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
                 + (f' In addition, {lacking}; w{fall}.' if effects else ''))
-    unseen = (f'The recording does not show how much of the error of '
-              f'{listed(diagnosis.unseen_noise)} is noise.') if diagnosis.unseen_noise else ''
+    unseen = (f'the recording does not show how much of the error of '
+              f'{listed(diagnosis.unseen_noise)} is noise') if diagnosis.unseen_noise else ''
     if not effects:
-        return f'No effect is reported. {unseen}' if unseen and not diagnosis.since else (
+        return f'No effect is reported: {unseen}.' if unseen and not diagnosis.since else (
             f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
             f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
-    level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
+    level = (f'; {unseen}.' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
     refuted = listed([f'{_title(diagnosis, effect)} ({effect.objection})'

@@ -107,7 +107,8 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
     Parameters
     ----------
     model : DriveModel
-        Of an arm all inertia and friction is fitted; of the others what `tolerances` leave open.
+        Of an arm, and of a slide without `tolerances`, inertia and friction are fitted; else what
+        `tolerances` leave open.
     recordings : sequence of Recording
         Of free motion.
     validate : sequence of Recording, optional
@@ -144,19 +145,19 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
 
 def require_open_numbers(model: DriveModel) -> None:
     """Raise FitError where a model has nothing that a fit may move."""
-    if not model.is_mechanism and not model_numbers(model):
+    if not model.moves_joints and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
 
 
 def halves(recording: Recording) -> list[Recording]:
-    """Return the first and the second half of a recording."""
-    start, end = recording.segments[0].start, recording.segments[-1].stop
-    middle = (start + end) // 2
+    """Return two parts of a recording with as many measured efforts each."""
+    measured = np.flatnonzero(np.isfinite(recording.effort).any(axis=1))
+    end, middle = recording.segments[-1].stop, int(measured[len(measured) // 2])
     return [replace(recording, segments=tuple(
         slice(max(part.start, low), min(part.stop, high)) for part in recording.segments
         if max(part.start, low) < min(part.stop, high)))
-        for low, high in ((start, middle), (middle, end))]
+        for low, high in ((0, middle), (middle, end))]
 
 
 def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str, float]:
@@ -168,7 +169,7 @@ def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str
 
 
 def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
-    if model.is_mechanism:
+    if model.is_mechanism or not model_numbers(model):
         return fit_arm(model, recordings)
     # As in a diagnosis without any effect: the tolerance is the prior, and the width in which
     # friction reverses is free.

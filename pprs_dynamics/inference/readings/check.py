@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveColumns, RecordedColumns
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.efforts import (
@@ -536,12 +537,15 @@ def _unit(model: DriveModel, group: Sequence[int], scales: Array) -> OtherReadin
                            what, scales=_effort_scales(model, group, scales))
 
 
+def _as_read(model: DriveModel, drive: str) -> DriveColumns:
+    """Return the columns and scales with which a model file reads a drive."""
+    return (model.recorded.columns or RecordedColumns()).drives.get(drive, DriveColumns())
+
+
 def _effort_scales(model: DriveModel, group: Sequence[int], scales: Array) -> Scales:
     """Return the factors below `columns` by which efforts are divided by others, (D,)."""
-    before = model.recorded.columns
-    return tuple((model.drives[k], 'effort_scale', (
-        1.0 if before is None else before.drives[model.drives[k]].effort_scale)
-        / float(scales[k])) for k in group)
+    return tuple((model.drives[k], 'effort_scale', _as_read(
+        model, model.drives[k]).effort_scale / float(scales[k])) for k in group)
 
 
 def mounted_gravity(model: DriveModel, direction: Array) -> Array:
@@ -566,15 +570,13 @@ def in_reading(model: DriveModel, reading: Reading) -> DriveModel:
 def _position_scales(model: DriveModel, reading: Reading) -> Scales:
     """Return the factors and offsets below `columns` with which positions are read so."""
     found = []
-    for k, drive in enumerate(model.drives):
-        columns = model.recorded.columns
-        before = None if columns is None else columns.drives[drive]
-        scale, start = (1.0, 0.0) if before is None else (
-            before.position_scale, before.position_offset)
-        factor = float(reading.scale[k])
-        if k in reading.drives and factor != 1:
-            found.append((drive, 'position_scale', factor * scale))
-        if k in reading.drives and (total := factor * start + float(reading.offset[k])) != start:
+    for k in reading.drives:
+        drive, factor = model.drives[k], float(reading.scale[k])
+        before = _as_read(model, drive)
+        if factor != 1:
+            found.append((drive, 'position_scale', factor * before.position_scale))
+        total = factor * before.position_offset + float(reading.offset[k])
+        if total != before.position_offset:
             found.append((drive, 'position_offset', total))
     return tuple(found)
 
@@ -585,8 +587,7 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
     moved = [(keys, places) for keys, places in (
         (('position', 'velocity'), reading.positions), (('effort', 'current'), reading.efforts))
         if np.any(places != np.arange(len(drives)))]
-    columns = {} if model.recorded.columns is None else model.recorded.columns.drives
-    names = {drive: columns[drive].names for drive in columns}
+    names = {drive: _as_read(model, drive).names for drive in drives}
     if not any(names.values()):
         if len(moved) > 1:
             return (), 'joint_map: {' + ', '.join(
@@ -667,7 +668,7 @@ def _of_rate(model: DriveModel, recording: Recording, excerpt: Excerpt | None) -
 def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
                    ) -> Iterator[Defect]:
     """Yield recorded velocities in other units or signs than positions."""
-    columns, groups = model.recorded.columns, dict[float, list[int]]()
+    groups: dict[float, list[int]] = {}
     for drive, factor in _factors(excerpt).items():
         for wrong in table.VELOCITY_UNITS:
             if abs(factor / wrong - 1) <= table.NEAR_ONE:
@@ -677,6 +678,5 @@ def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | N
         yield OtherReading.of(
             'velocity', recording.drives, group, 'the recorded velocity of '
             f'{named(recording.drives, tuple(group))} is {times} the derivative of the position',
-            scales=tuple((drive, 'velocity_scale', (
-                1.0 if columns is None else columns.drives[drive].velocity_scale) / factor)
-                for drive in (recording.drives[k] for k in group)))
+            scales=tuple((drive, 'velocity_scale', _as_read(model, drive).velocity_scale / factor)
+                         for drive in (recording.drives[k] for k in group)))

@@ -38,7 +38,7 @@ ROLE = '(ist|soll|act|cmd|meas|fbk|des|ref)'
 # Words that another may precede in one: Gelenkmoment, but not timestamp nor payload.
 LONG, LONGER = ('|'.join(sorted((word for word in QUANTITIES if len(word) >= least), reverse=True))
                 for least in (3, 5))
-COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG})(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
+COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG}|d?qd?)(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
                       f'|([a-z]{{3,}})({LONGER})(?:e?[ns])?(?:{ROLE}(?:wert)?)?')
 
 
@@ -151,8 +151,9 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
                                            '': each.column}, EFFORT, None)[0] > 0])
     if not known:
         raise GuessError(
-            f'no columns of {main}s are told by their names: {_listed(left)}; write them '
-            f'into columns, e.g. {{{joints[0]}: {{{main}: {_first(left)}}}}}')
+            f'no columns of {main}s are told by their names: ' + ', '.join(
+                each.title or str(each.column) for each in left[:12])
+            + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {left[0].column}}}}}')
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
@@ -224,14 +225,6 @@ def _split(word: str) -> list[str]:
         return [word[:-1], table.LETTERS[word[-1]]]
     compound = COMPOUND.fullmatch(word)
     return [part for part in compound.groups() if part] if compound else [word]
-
-
-def _listed(series: Sequence[Series]) -> str:
-    return ', '.join(one.title or str(one.column) for one in series[:12]) or 'none'
-
-
-def _first(series: Sequence[Series]) -> str:
-    return str(series[0].column) if series else 'q1'
 
 
 # ------------------------------------------------------------------------------------- time
@@ -327,6 +320,8 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         for one in series:
             groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
     columns: Columns = {}
+    values = np.column_stack([each.values for each in series])
+    places = {each.column: k for k, each in enumerate(series)}
     currents_are_measured = False
     wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
     for each in wanted:
@@ -338,10 +333,12 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         if each == EFFORT and not is_measured and currents_are_measured:
             continue
         currents_are_measured = each == CURRENT and is_measured
-        best = _last_of(best, [key for key in groups if _fit(key, groups[key], each, quantity)
-                               == _fit(best, groups[best], each, quantity)], groups, series)
-        if {*best} & table.COMMANDS:
-            notes.append(f'{each}: only commands are there ({" ".join(best)})')
+        rivals = [key for key in groups if _fit(key, groups[key], each, quantity)
+                  == _fit(best, groups[best], each, quantity)]
+        # Of groups that move alike commands come first in time.
+        shared = [joint for joint in groups[best] if all(joint in groups[key] for key in rivals)]
+        blocks = [[places[groups[key][joint]] for joint in shared] for key in rivals]
+        best = rivals[_measured(values, blocks)] if shared else best
         if each == EFFORT:
             columns = {key: column for key, column in columns.items() if key[1] != CURRENT}
         columns.update({(joint, each): column for joint, column in groups[best].items()})
@@ -351,17 +348,6 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
             columns.update({(joint, channel): column for joint, column in groups[max(
                 told, key=lambda key: len(groups[key]))].items()})
     return columns, notes
-
-
-def _last_of(best: tuple[str, ...], rivals: Sequence[tuple[str, ...]],
-             groups: Mapping[tuple[str, ...], Mapping[str, Column]], series: Sequence[Series],
-             ) -> tuple[str, ...]:
-    """Return the group that moves last of those that move alike: commands come first."""
-    values = {one.column: one.values for one in series}
-
-    joint = max(groups[best], key=lambda joint: np.nanstd(values[groups[best][joint]]))
-    return max((key for key in rivals if joint in groups[key]), key=lambda key: _lag(
-        values[groups[best][joint]], values[groups[key][joint]]) or 0) if len(rivals) > 1 else best
 
 
 def _lag(values: Array, other: Array) -> int | None:
@@ -392,7 +378,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
     # The name of the joint alone is a position, as in `shoulder_pan`.
-    plain = not told and not {*key} - {'*', 'observation'}
+    plain = not told and not {*key} - {'*', 'observation'} - table.MEASURED
     fits = given is not None or quantity in told or (quantity == POSITION and plain)
     if quantity == POSITION and VELOCITY in told:
         fits = False
@@ -507,21 +493,24 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
         return {(joint, quantity): each.column
                 for joint, each in zip(joints, series, strict=False)}
     values = np.column_stack([each.values for each in series])
-    candidates = [*_chains(values, time, count)] or [*_layouts(values, time, count)]
+    links = Links.of(values, time)
+    candidates = [*_chains(values, links, count)] or [*_layouts(links, count)]
     if not candidates:
         raise GuessError(
             f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
             f'joints ({", ".join(joints)}), nor are there as many positions with their '
             f'velocities: write columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} '
             'with numbers from 1')
-    scored = [(_explained(values[:, group], values[:, kinds[POSITION]], time), kinds, group)
-              for kinds, groups in candidates for group in groups]
+    scored = [(float(np.mean(_shares(values[:, group], values[:, kinds[POSITION]], time) or -1)),
+               kinds, group) for kinds, groups in candidates for group in groups]
     # Of positions that explain as much the smoothest, as no effort is.
     near = [each for each in scored if each[0] > max(scored)[0] - table.CLEAR]
     kinds = min([each[1] for each in near] or [candidates[0][0]],
                 key=lambda kinds: _roughness(values[:, kinds[POSITION]]))
     efforts = [group for _, other, group in near if other is kinds]
-    unlike = next((group for group in efforts if not _are_alike(values, efforts[0], group)), None)
+    with np.errstate(invalid='ignore'):  # of columns that do not change
+        unlike = next((group for group in efforts if not np.nanmin(
+            links.alike[efforts[0], group]) > table.COPY), None)
     used = {place for places in kinds.values() for place in places}
     known = stamp | {(joint, kind): series[place].column for kind, places in kinds.items()
                      for joint, place in zip(joints, places, strict=False)}
@@ -541,7 +530,7 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
     if efforts:
-        kinds = {**kinds, EFFORT: _measured(values, efforts)}
+        kinds = {**kinds, EFFORT: efforts[_measured(values, efforts)]}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in kinds.items()]
     unused = [place for place in range(len(series))
@@ -561,14 +550,6 @@ def _ask_for_one(joints: Sequence[str], known: Columns, efforts: Sequence[Column
                                f'column {efforts[0]} may be that of one joint')
 
 
-def _are_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
-    """Return whether two blocks are the same but for scales."""
-    pairs = [np.corrcoef(values[:, a], values[:, b])[0, 1]
-             for a, b in zip(block, other, strict=False)
-             if np.ptp(values[:, a]) > 0 and np.ptp(values[:, b]) > 0]
-    return bool(pairs) and min(pairs) > table.COPY
-
-
 def _span(series: Sequence[Series], places: Sequence[int]) -> str:
     columns = [str(series[place].column) for place in places]
     if len(places) > 1 and [*places] == [*range(places[0], places[-1] + 1)]:
@@ -579,9 +560,8 @@ def _span(series: Sequence[Series], places: Sequence[int]) -> str:
 Candidate = tuple[dict[str, list[int]], list[list[int]]]  # positions, velocities; other blocks
 
 
-def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+def _chains(values: Array, links: Links, count: int) -> Iterator[Candidate]:
     """Yield positions and velocities by derivatives, where each joint has both."""
-    links = Links.of(values, time)
     with np.errstate(invalid='ignore'):
         derived = (links.correlation > table.ALIKE) & (links.slope > 0)
         # What has a velocity is followed by it best: an effort may resemble a position.
@@ -600,11 +580,11 @@ def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
             group.append(i)
     pairs = []
     for group in groups:
-        i = _measured(values, [[k] for k in group])[0]
-        speeds = np.flatnonzero(derived[i])
-        most = speeds[np.argmax(links.correlation[i, speeds])]
-        pairs.append((i, _measured(values, [[k] for k in speeds.tolist() if same[most, k]
-                                            or k == most])[0]))
+        i = group[_measured(values, [[k] for k in group])]
+        speeds = np.flatnonzero(derived[i]).tolist()
+        most = max(speeds, key=lambda k: links.correlation[i, k])
+        speeds = [most, *(k for k in speeds if same[most, k] and k != most)]
+        pairs.append((i, speeds[_measured(values, [[k] for k in speeds])]))
     pairs.sort()
     # Velocities of one robot are in one unit.
     slopes = [float(np.log(links.slope[pair])) for pair in pairs]
@@ -620,9 +600,9 @@ def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
             rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
 
 
-def _layouts(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+def _layouts(links: Links, count: int) -> Iterator[Candidate]:
     """Yield positions, and velocities if there are any, in blocks or in every so many columns."""
-    width = values.shape[1]
+    width = len(links.alike)
     if width % count or not width:
         return
     number = width // count
@@ -630,37 +610,36 @@ def _layouts(values: Array, time: Array, count: int) -> Iterator[Candidate]:
     if count > 1 and number > 1:
         layouts.append([[*range(b, width, number)] for b in range(number)])
     for layout in layouts:
-        links = [[block is not other and _linked(values, block, other, time) for other in layout]
-                 for block in layout]
-        for block, is_rate in zip(layout, links, strict=True):
-            if not any(link[layout.index(block)] for link in links):
-                speeds = [other for other, yes in zip(layout, is_rate, strict=True) if yes]
+        # A block has the derivatives of another where most joints that move have them.
+        found = np.nan_to_num(np.array([[np.median(moving) if len(
+            moving := (values := links.correlation[block, other])[np.isfinite(values)]) else 0.0
+            for other in layout] for block in layout]))
+        is_rate = (found > table.ALIKE) & ~np.eye(number, dtype=bool)
+        for b, block in enumerate(layout):
+            if not is_rate[:, b].any():
+                speeds = [layout[k] for k in np.flatnonzero(is_rate[b]).tolist()]
                 yield {POSITION: block, **({VELOCITY: speeds[0]} if speeds else {})}, [
                     other for other in layout if other is not block and other not in speeds]
 
 
-def _measured(values: Array, blocks: Sequence[list[int]]) -> list[int]:
-    """Return of blocks that move alike the last one, or the one with noise: commands have none."""
-    first = values[:, blocks[0]]
-    lags = [float(np.median([_lag(one, other) or 0 for one, other in zip(
-        first.T, values[:, block].T, strict=True)])) for block in blocks]
+def _measured(values: Array, blocks: Sequence[Sequence[int]]) -> int:
+    """Return the place of the block that is measured, of those that move as the first one does.
+
+    That is the last one, or the one with noise: commands have none.
+    """
+    lags = [[_lag(values[:, first], values[:, other]) for first, other in zip(
+        blocks[0], block, strict=True)] for block in blocks]
+    alike = [k for k, each in enumerate(lags) if k == 0 or None not in each]
     rough = [_roughness(values[:, block]) for block in blocks]
-    return max(zip(lags, rough, blocks, strict=True), key=lambda each: (
-        each[0], each[1] > table.ROUGHER * min(rough)))[2]
+    least = table.ROUGHER * min(rough[k] for k in alike)
+    return max(alike, key=lambda k: (float(np.median([lag or 0 for lag in lags[k]])),
+                                     rough[k] > least))
 
 
 def _roughness(values: Array) -> float:
     """Return the size of third differences over that of the first ones: small for a motion."""
     moved = np.std(np.diff(values, axis=0), axis=0)
     return float(np.median(np.std(np.diff(values, 3, axis=0), axis=0) / np.maximum(moved, 1e-300)))
-
-
-def _linked(values: Array, block: Sequence[int], other: Sequence[int], time: Array) -> bool:
-    """Return whether a block has the derivatives of another, of the joints that move."""
-    count = len(block)
-    links = Links.of(values[:, [*block, *other]], time)
-    found = np.diagonal(links.correlation[:count, count:])
-    return bool(np.isfinite(found).any() and np.nanmedian(found) > table.ALIKE)
 
 
 def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
@@ -671,12 +650,6 @@ def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
                 for i in used for j in used if links.correlation[i, j] > table.ALIKE)):
             return True
     return False
-
-
-def _explained(efforts: Array, position: Array, time: Array) -> float:
-    """Return the mean of `_shares`; -1 where no effort changes."""
-    shares = _shares(efforts, position, time)
-    return float(np.mean(shares)) if shares else -1.0
 
 
 def _shares(efforts: Array, position: Array, time: Array) -> list[float]:

@@ -112,7 +112,8 @@ WORDS = {
     VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
                'omega', 'qvel', 'dpos', 'v', 'thd', 'dth', 'drehzahl', 'geschwindigkeit'),
     EFFORT: ('effort', 'efforts', 'eff', 'tau', 'torque', 'torques', 'trq', 'torq', 'force',
-             'moment', 'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
+             'moment', 'mom', 'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment',
+             'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
 }

@@ -47,7 +47,7 @@ LEAST_POSES = 20  # that are held: their errors are independent
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
 NOISE_STEPS = 2  # of the noise in a round
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
-MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
+MOST_PRODUCTS = 8000  # products of blocks on a drive, both ways, that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
@@ -198,28 +198,36 @@ class Regression:
         full: Array = precision + (1e-9 * scale + 1e-300) * np.eye(size)
         return full
 
-    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
-        """Return band sums of a block's rows with those of others; None: the base and error.
+    def products(self, blocks: Sequence[Block], d: int) -> dict[tuple[Block, Block | None], Array]:
+        """Return band sums of the rows of all pairs of blocks, and with the base and error (None).
 
-        Of those that are not known all at once: a call is dearer than a product.
+        Of new blocks all at once: a call is dearer than a product.
         """
-        known: dict[Block | None, Array] = {}
-        for b in others:
-            if (found := self._products.get((a, b, d))) is not None:
-                known[b] = found
-            elif b is not None and (turned := self._products.get((b, a, d))) is not None:
-                known[b] = turned.transpose(0, 2, 1)
-        new = [b for b in others if b not in known]
-        if new:
-            rows = [self.base[d] if b is None else b.rows[d] for b in new]
-            found = self.series[d].products(a.rows[d], np.concatenate(rows))
-            for b, part in zip(new, np.split(found, np.cumsum(list(map(len, rows)))[:-1], axis=2),
-                               strict=True):
-                self._products[a, b, d] = known[b] = part
-            if len(self._products) > MOST_PRODUCTS:
-                for key in list(self._products)[:MOST_PRODUCTS // 2]:  # computed first
-                    self._products.pop(key, None)
-        return [known[b] for b in others]
+        known = self._products
+        if len(known) > MOST_PRODUCTS:
+            for key in list(known)[:MOST_PRODUCTS // 2]:  # computed first
+                del known[key]
+
+        def multiply(some: Sequence[Block], others: Sequence[Block | None]) -> None:
+            rows = [self.base[d] if b is None else b.rows[d] for b in others]
+            found = self.series[d].products(np.concatenate([a.rows[d] for a in some]),
+                                            np.concatenate(rows))
+            edges = np.cumsum([0, *map(len, rows)]).tolist()
+            first = 0
+            for a in some:
+                part = found[:, first:(first := first + a.size)]
+                for b, i, j in zip(others, edges, edges[1:], strict=False):
+                    known[a, b, d] = part[:, :, i:j]
+                    if b is not None:
+                        known[b, a, d] = part[:, :, i:j].transpose(0, 2, 1)
+
+        if new := [a for a in blocks if (a, None, d) not in known]:
+            multiply(new, [None, *blocks])
+        for a in blocks:
+            if others := [b for b in blocks if (a, b, d) not in known]:
+                multiply([a], others)
+        return {(a, b): known[a, b, d] for k, a in enumerate(blocks)
+                for b in (None, *blocks[:k + 1])}
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
@@ -253,8 +261,9 @@ class Regression:
         last = np.inf
         for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
-            amplitudes = shapes.fitted(amplitudes, solution.squares, self.counts,
-                                       solution.leverage, NOISE_STEPS)
+            amplitudes = shapes.fitted(
+                amplitudes, solution.squares, self.counts,
+                system.leverage(solution.covariance, spectra), NOISE_STEPS)
             spectra = shapes.spectra(amplitudes)
             solution = system.solve(spectra, self.counts)
             change = abs(before - solution.deviance)
@@ -380,7 +389,7 @@ class Regression:
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with the residual, and full products of a block."""
         taken, b = Columns(self, block.rows).projected(fit)
-        S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, [block], d)[0], 1)
+        S = np.sum([np.tensordot(self.weights(fit, d), self.products([block], d)[block, block], 1)
                     for d in block.rows], axis=0)
         return S - taken @ fit.covariance @ taken.T, b, S
 
@@ -402,18 +411,24 @@ class Columns:
     def __len__(self) -> int:
         return max((len(values) for values in self.rows.values()), default=0)
 
-    def _cross(self, d: int, block: Block | None) -> Array:
-        """Return band sums of all rows with a block's, or with base and error, (B, R, k)."""
-        key = (d, block)
-        if key not in self._crosses:
-            if len(self._crosses) > MOST_CROSSES * len(self.rows):
-                self._crosses = {one: cross for one, cross in self._crosses.items()
-                                 if one[1] is None}
-            rows = self.rows[d]
-            other = self.regression.base[d] if block is None else block.rows[d]
-            self._crosses[key] = self.regression.series[d].products(
-                rows, other.astype(rows.dtype)).astype(rows.dtype)
-        return self._crosses[key]
+    def _compute(self, d: int, blocks: Sequence[Block | None]) -> None:
+        """Compute band sums of all rows with blocks, None: base and error, that are not known.
+
+        Of all at once, (B, R, k) each: reading the rows takes most of the time.
+        """
+        new = [block for block in blocks if (d, block) not in self._crosses]
+        if not new:
+            return
+        if len(self._crosses) > MOST_CROSSES * len(self.rows):
+            self._crosses = {one: cross for one, cross in self._crosses.items()
+                             if one[1] is None or one[1] in blocks}
+        rows, base = self.rows[d], self.regression.base[d]
+        others = [base if block is None else block.rows[d] for block in new]
+        found = self.regression.series[d].products(
+            rows, np.concatenate(others).astype(rows.dtype)).astype(rows.dtype)
+        for block, cross in zip(new, np.split(found, np.cumsum(list(map(len, others)))[:-1],
+                                              axis=2), strict=True):
+            self._crosses[d, block] = np.ascontiguousarray(cross)
 
     def projected(self, fit: JointFit) -> tuple[Array, Array]:
         """Return whitened products with all columns of a fit, (R, P), and with its residual.
@@ -425,9 +440,10 @@ class Columns:
         for d, rows in self.rows.items():
             index, acting = self.regression.local(fit, d)
             weights = self.regression.weights(fit, d).astype(rows.dtype)
+            self._compute(d, [None, *acting])
 
             def weighted(block: Block | None, d: int = d, weights: Array = weights) -> Array:
-                cross = self._cross(d, block)
+                cross = self._crosses[d, block]
                 found: Array = (weights @ cross.reshape(len(weights), -1)).reshape(
                     cross.shape[1:]).astype(float)
                 return found

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Protocol
 
 import numpy as np
@@ -132,28 +133,30 @@ class Prior:
         limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
         return cls(precision, mean, log_det, limited)
 
-    def posterior(self, gram: Array, side: Array) -> Posterior:
+    def posterior(self, gram: Array, side: Array, beyond: Array | None = None) -> Posterior:
         """Return the posterior of coefficients, given X^T S^-1 X and X^T S^-1 y.
 
         A number beyond its tolerance is held back by a prior that is much steeper there.
+
+        Parameters
+        ----------
+        gram : (P, P) array
+        side : (P,) array
+        beyond : (P,) array, optional
+            Where numbers are tried first, see `Posterior`; there is one solution.
         """
         if not len(side):
-            return Posterior(self.mean, gram, 0.0, 0.0)
+            return Posterior(self.mean, gram, 0.0, 0.0, side)
         b = side - gram @ self.mean
-        beyond = np.zeros(len(b))
+        beyond = np.zeros(len(b)) if beyond is None else beyond.copy()
         open_prior = gram + self.precision
+        diagonal = np.diag(open_prior) * (1 + 1e-12)  # of Cholesky's factor rounding is as small
         for number in range(MOST_LIMITED):
-            H = open_prior + np.diag(BEYOND_TOLERANCE * np.abs(beyond)) if beyond.any() else (
-                open_prior)
-            scale = 1 / np.sqrt(np.einsum('ii->i', H))
-            scales = np.outer(scale, scale)
-            scaled = H * scales
-            np.einsum('ii->i', scaled)[:] += 1e-12
-            factor, minor = dpotrf(scaled)
+            np.einsum('ii->i', open_prior)[:] = diagonal + BEYOND_TOLERANCE * np.abs(beyond)
+            factor, minor = dpotrf(open_prior)
             if minor:
                 raise np.linalg.LinAlgError(f'minor {minor} of the normal equations is negative')
-            away = scale * dpotrs(factor, scale * (
-                b + BEYOND_TOLERANCE * DEVIATIONS * beyond))[0]
+            away = dpotrs(factor, b + BEYOND_TOLERANCE * DEVIATIONS * beyond)[0]
             now = np.sign(away) * (self.limited & (np.abs(away) > DEVIATIONS))
             changed = np.flatnonzero(now != beyond)
             if not len(changed):
@@ -166,12 +169,11 @@ class Prior:
         upper = dpotri(factor)[0]  # 0 below the diagonal, as the factor is
         covariance = upper + upper.T
         np.einsum('ii->i', covariance)[:] = np.einsum('ii->i', upper)
-        covariance *= scales
         penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
             np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
-        log_det = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
-        log_det += self._both_sides(away, np.diag(covariance), beyond)
-        return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
+        log_det = 2 * float(np.log(np.einsum('ii->i', factor)).sum())
+        log_det += self._both_sides(away, np.einsum('ii->i', covariance), beyond)
+        return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det, beyond)
 
     def _both_sides(self, away: Array, variance: Array, beyond: Array) -> float:
         """Return what -2 ln of the integral over numbers with a tolerance has more.
@@ -199,12 +201,16 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Coefficients given a noise: mean, covariance, c'Lc of the prior, and ln det (H + L) / L."""
+    """Coefficients given a noise: mean, covariance, c'Lc of the prior, and ln det (H + L) / L.
+
+    `beyond` is +-1 for numbers beyond their tolerance, else 0.
+    """
 
     coefficients: Array
     covariance: Array
     penalty: float
     log_det: float
+    beyond: Array
 
 
 class Fitted(Protocol):
@@ -215,8 +221,8 @@ class Fitted(Protocol):
     base_index: dict[int, np.typing.NDArray[np.int_]]
     base_products: dict[int, Array]
 
-    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
-        """Return band sums of products of a block's rows with others' on a drive."""
+    def products(self, blocks: Sequence[Block], d: int) -> dict[tuple[Block, Block | None], Array]:
+        """Return band sums of products of rows of pairs of blocks on a drive; None: the base."""
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return those of a drive and the blocks that it feels."""
@@ -243,19 +249,18 @@ class DriveEquations:
         side = np.empty((count, size))
         gram[:, :first, :first] = base[:, :-1, :-1]
         side[:, :first] = base[:, :-1, -1]
-        at = first
-        spots: list[tuple[Block, slice]] = []
-        for block in acting:
-            spot = slice(at, at + block.size)
-            spots.append((block, spot))
-            with_base, *pairs = regression.products(block, [None, *(b for b, _ in spots)], d)
-            gram[:, spot, :first] = with_base[:, :, :-1]
-            gram[:, :first, spot] = with_base[:, :, :-1].transpose(0, 2, 1)
-            side[:, spot] = with_base[:, :, -1]
-            for (_, place), pair in zip(spots, pairs, strict=True):
-                gram[:, spot, place] = pair
-                gram[:, place, spot] = pair.transpose(0, 2, 1)
-            at += block.size
+        places = dict(zip(acting, accumulate((block.size for block in acting), initial=first),
+                          strict=False))
+        for (a, b), product in regression.products(acting, d).items():
+            rows = slice(places[a], places[a] + a.size)
+            if b is None:
+                gram[:, rows, :first] = product[:, :, :-1]
+                gram[:, :first, rows] = product[:, :, :-1].transpose(0, 2, 1)
+                side[:, rows] = product[:, :, -1]
+            else:
+                other = slice(places[b], places[b] + b.size)
+                gram[:, rows, other] = product
+                gram[:, other, rows] = product.transpose(0, 2, 1)
         self.gram, self.side, self.squares = gram, side, base[:, -1, -1]
         self._flat = gram.reshape(count, -1)
 
@@ -284,7 +289,6 @@ class Solution:
     covariance: Array
     deviance: float
     squares: Array
-    leverage: Array
 
 
 class NormalEquations:
@@ -300,6 +304,7 @@ class NormalEquations:
         self.drives: list[DriveEquations] = []
         self.indices: list[np.typing.NDArray[np.int_]] = []
         self._pairs: list[np.typing.NDArray[np.int_]] = []  # of these, in a flat (P, P) array
+        self._beyond: Array | None = None  # of the solution before
         for d in regression.drives:
             acting = tuple(block for block in blocks if d in block.rows)
             self.drives.append(regression.equations(d, acting))
@@ -334,12 +339,16 @@ class NormalEquations:
     def solve(self, spectra: Array, counts: Array) -> Solution:
         """Return the solution under noise spectra (D, B)."""
         weights = 1 / spectra
-        found = self.prior.posterior(*self.weighted(weights))
+        found = self.prior.posterior(*self.weighted(weights), self._beyond)
+        self._beyond = found.beyond
         squares = np.stack([drive.left(found.coefficients[index])
                             for drive, index in zip(self.drives, self.indices, strict=True)])
-        leverage = np.stack([
-            drive.leverage(found.covariance.reshape(-1)[pairs], weights[k])
-            for k, (drive, pairs) in enumerate(zip(self.drives, self._pairs, strict=True))])
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
                          + found.penalty + found.log_det)
-        return Solution(found.coefficients, found.covariance, deviance, squares, leverage)
+        return Solution(found.coefficients, found.covariance, deviance, squares)
+
+    def leverage(self, covariance: Array, spectra: Array) -> Array:
+        """Return the degrees of freedom spent in the bands of all drives, (D, B)."""
+        return np.stack([
+            drive.leverage(covariance.reshape(-1)[pairs], weights) for drive, pairs, weights
+            in zip(self.drives, self._pairs, 1 / spectra, strict=True)])

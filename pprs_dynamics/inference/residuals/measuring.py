@@ -123,6 +123,7 @@ def join_tables(model: DriveModel, tables: list[dict[Any, Array]]) -> Residuals:
     time = joined.pop('time')
     segment, record = (joined.pop(name).astype(int) for name in ('segment', 'record'))
     measured, total = joined.pop('measured'), joined.pop('total')
-    steps = np.diff(time)[np.diff(segment) == 0]
+    steps = np.diff(time)[np.diff(segment) == 0]  # none between poses that are held
     return Residuals(model.drives, time, segment, measured, total, joined, variables,
-                     float(np.median(steps)), model.units, record)
+                     float(np.median(steps)) if len(steps) else Residuals.period,
+                     model.units, record)

@@ -21,7 +21,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import REVERSAL, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -139,18 +138,6 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
     return root_mean_square(linear_residual(fits, fitted))
 
 
-def exact_forces(design: Design, model: DriveModel) -> Array:
-    """Return the treated forces of a model on the recordings of a design, (M, D) [N].
-
-    Raises
-    ------
-    PprsError
-        Where the model cannot follow them.
-    """
-    return np.concatenate([treated_forces(model, table)['total']
-                           for table in design.reconstructed(model)])
-
-
 def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
     """Return a set around its own fitted model, and the fitted sets that it is one of.
 
@@ -184,7 +171,7 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
     linear = linear_prediction(fits, fitted)
     measured = fits.regression.residuals.measured
     target = model_at(design, base, effects)
-    exact = exact_forces(design, target)
+    exact = design.exact_forces(target)
     before = design.point
     if (squared(fits, fitted, exact - linear) < LEAST_DIFFERENCE
             and _has_nonlinear(before, effects)):
@@ -200,7 +187,7 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
             effects = tuple(_between(known[effect.effect, effect.drive], effect)
                             for effect in effects)
             target = model_at(design, base, effects)
-            loss = squared(fits, fitted, measured - exact_forces(design, target))
+            loss = squared(fits, fitted, measured - design.exact_forces(target))
         else:
             return None
     return OperatingPoint(target, base, effects)

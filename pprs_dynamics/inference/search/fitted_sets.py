@@ -71,6 +71,7 @@ class FittedSets:
         self.form_errors = FormErrors(design, self.regression, decisions)
         self.constraints = Constraints(design)
         self._evaluated: dict[Hashable, CandidateSet] = {}
+        self._best: CandidateSet | None = None
         self._nuisance: dict[Hashable, Mapping[str, Block]] = {}
 
     @property
@@ -85,7 +86,7 @@ class FittedSets:
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
-        return min(self._evaluated.values(), key=lambda fitted: fitted.cost)
+        return self._best or self.evaluate(())
 
     def evaluate(self, candidates: Candidates) -> CandidateSet:
         """Return a set, fitted; one that was fitted before is not fitted again.
@@ -94,7 +95,10 @@ class FittedSets:
         """
         key = set_key(candidates)
         if key not in self._evaluated:
-            self._evaluated[key] = self._fitted(tuple(sorted(candidates, key=lambda c: c.rank)))
+            fitted = self._fitted(tuple(sorted(candidates, key=lambda c: c.rank)))
+            self._evaluated[key] = fitted
+            if self._best is None or fitted.cost < self._best.cost:
+                self._best = fitted
             self.stepped()
         return self._evaluated[key]
 

@@ -160,7 +160,7 @@ class FormErrors:
     def _of_block(self, fitted: CandidateSet, block: Block, c: Array) -> Squares:
         """Return the whitened squares of a block's force with coefficients c (k,)."""
         return {d: float(self.regression.weights(fitted.fit, d) @ (
-            self.regression.products(block, [block], d)[0] @ c @ c)) for d in block.rows}
+            self.regression.products([block], d)[block, block] @ c @ c)) for d in block.rows}
 
 
 def _is_free(effect: EffectCandidate) -> bool:

@@ -10,7 +10,7 @@ model. A force that one of them takes for slow noise is then not forgiven.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Integers, Regression
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 
 BLOCKS = 10
@@ -155,10 +155,18 @@ class HeldOut:
         return replace(found, gains=found.gains + share[:, None])
 
 
-def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
+def hold_out(fits: FittedSets, fitted: CandidateSet,
+             only: Collection[Component] | None = None) -> HeldOut:
     """Return how a set predicts blocks of the recordings from the others.
 
     The fits to the other blocks have the priors and the noise of the whole fit.
+
+    Parameters
+    ----------
+    fits : FittedSets
+    fitted : CandidateSet
+    only : collection of Component, optional
+        Whose forces the predictions of `error` contain; by default those of all effects.
     """
     regression, fit = fits.regression, fitted.fit
     size = len(fit.coefficients)
@@ -183,7 +191,9 @@ def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
     coefficients = np.stack([fit.coefficients for fit in others])
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
-    plain[:, fit.index_of(fitted.nuisance_blocks)] = 0.0
+    left_out = fitted.nuisance_blocks if only is None else [
+        block for block in fit.blocks if block not in [fitted.blocks[each] for each in only]]
+    plain[:, fit.index_of(left_out)] = 0.0
     left = np.full(regression.residuals.measured.shape, np.nan)
     squares, count = 0.0, 0
     for d, (index, rows) in rows_of.items():

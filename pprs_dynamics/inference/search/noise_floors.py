@@ -53,8 +53,8 @@ def noise_floors(fits: FittedSets, period: float | None = None,
     regression, residuals = fits.regression, fits.design.residuals
     fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
     # Degrees of freedom that the columns leave, and the shares of both noises that lie there.
-    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).solve(
-        fit.spectra, regression.counts).leverage, 0.0)
+    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).leverage(
+        fit.covariance, fit.spectra), 0.0)
     powers = [noise.amplitudes @ regression.noise_shapes.at_bands for noise in (
         fit, reported or fit)]
     seen = np.all([np.sum(free * power, axis=1) >= fits.decisions.noise_seen * np.sum(
@@ -120,14 +120,19 @@ def catalogue_blocks(fits: FittedSets) -> list[Block]:
 
 
 def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
-    """Return rows (k, n) that span what an effect may do on a drive, in all its shapes nearly."""
+    """Return rows (k, n) that span what an effect may do on a drive, in all its shapes nearly.
+
+    Rows count by their form alone: coefficients of one effect have different units.
+    """
     trials = effect.trials(fits.design.covered[d])
     if len(trials) > MOST_SHAPES:
         return np.zeros((0, 0))
     rows: Array = fits.components.local[d].rows_of(effect).astype(float)
-    if len(trials) == 1:
-        return np.compress(np.any(rows, axis=1), rows, axis=0)
+    rows = np.compress(np.any(rows, axis=1), rows, axis=0)
+    if len(trials) == 1 or not len(rows):
+        return rows
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
     values, axes = np.linalg.eigh(rows @ rows.T)
     order = np.argsort(-values)[:MOST_DIRECTIONS]
-    kept = order[values[order] > LEAST_DIRECTION ** 2 * max(float(values[-1]), 1e-300)]
+    kept = order[values[order] > LEAST_DIRECTION ** 2 * float(values[-1])]
     return axes[:, kept].T @ rows

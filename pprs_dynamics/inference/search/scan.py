@@ -18,7 +18,6 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component, E
 from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.system.parallel import each
 
 PROPOSED = -12.0  # lowest score of a proposal
 SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
@@ -71,13 +70,10 @@ class Scan:
         components, fit = self.fits.components, base.fit
         taken = {(component.effect, component.drive) for component in base.blocks}
 
-        def of_drive(d: int) -> list[tuple[Component, float]]:
-            found = list(components.local[d].offers(fit).values())
+        offers: list[tuple[Component, float]] = []
+        for d in components.local if drive is None else (drive,):
+            offers += components.local[d].offers(fit).values()
             self.fits.stepped()
-            return found
-
-        offered = each(of_drive, tuple(components.local) if drive is None else (drive,))
-        offers = [offer for found_there in offered for offer in found_there]
         if drive is None:
             offers += components.shared_offers(fit)
         best: dict[Hashable, Scored] = {}

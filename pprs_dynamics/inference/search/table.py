@@ -30,7 +30,6 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.courses import fit_courses
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.fitted_model import (
-    exact_forces,
     fitted_model,
     has_nonlinear,
     linear_prediction,
@@ -77,7 +76,7 @@ class Row:
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
-            exact = exact_forces(around.design, fitted_model(around, moved))
+            exact = around.design.exact_forces(fitted_model(around, moved))
         except PprsError:
             return cls(fits, replace(fitted, barred='no model can have its values'), 0.0)
         return cls(around, moved, squared(around, moved, exact - linear_prediction(around, moved)))

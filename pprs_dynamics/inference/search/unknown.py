@@ -29,7 +29,7 @@ from pprs_dynamics.inference.search.patterns import (
     build_families,
     trial_limits,
 )
-from pprs_dynamics.system.parallel import each, lazy
+from pprs_dynamics.system.parallel import lazy
 
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
 FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
@@ -340,9 +340,8 @@ class DrivePatterns:
 def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
                   ) -> list[UnknownCandidate]:
     """Return the best patterns of any drive at the noise of a fit, their limits refined."""
-    proposed = each(lambda components: components.proposals(fit, count), libraries)
-    found = [(candidate, gain, components) for components, offers in zip(
-        libraries, proposed, strict=True) for candidate, gain in offers]
+    found = [(candidate, gain, components) for components in libraries
+             for candidate, gain in components.proposals(fit, count)]
     found.sort(key=lambda scored: -scored[1])
     return [components.on_more_drives(components.refined(candidate, fit), fit)
             for candidate, gain, components in found[:count] if gain > 0]

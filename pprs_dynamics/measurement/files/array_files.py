@@ -20,7 +20,6 @@ import numpy as np
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.samples import Progress, Series
-from pprs_dynamics.measurement.files.way_out import MOST
 
 KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.npy': 'NumPy',
          '.json': 'JSON', '.jsonl': 'JSON', '.ndjson': 'JSON'}
@@ -69,14 +68,9 @@ class ArrayTable:
         Raises
         ------
         UnreadableFileError
-            For a column that is missing, holds no numbers or has another length than others.
+            For a column that holds no numbers or has another length than others.
         """
-        places = [self.place(column) for column in wanted]
-        if None in places:
-            raise UnreadableFileError(
-                self.path, f'no column {wanted[places.index(None)]}: its columns have names, '
-                + ', '.join(sorted(self.names)[:MOST]))
-        known = [place for place in places if place is not None]
+        known = [place for column in wanted if (place := self.place(column)) is not None]
         loaded = self.load(list(dict.fromkeys(name for name, _ in known)))
         arrays = [self._element(name, loaded[name], element) for name, element in known]
         lengths = list(map(len, arrays))

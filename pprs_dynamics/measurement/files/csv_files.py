@@ -153,13 +153,9 @@ class CsvTable:
         Raises
         ------
         UnreadableFileError
-            If a column is missing, a row has another count of cells, or a cell is no number.
+            If a row has another count of cells, or a cell is no number.
         """
         used = [place for column in wanted if (place := self.place(column)) is not None]
-        if len(used) < len(wanted):
-            missing = next(column for column in wanted if self.place(column) is None)
-            raise UnreadableFileError(self.path, f'no column {missing}; it holds '
-                                      f'{counted(self.count, "column")}')
         dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)

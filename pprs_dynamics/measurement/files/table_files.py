@@ -78,6 +78,7 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         own: Column = columns.time if columns.time is not None else next(
             (name for name in TIME_COLUMNS if name in table.names), 1)
         _require(table, [own])
+        _require(table, [own])
         shared = table.read([own])[0]
     stamps, epoch, prefix = np.zeros(0), 0, ''
     arrays: dict[tuple[str, str], Array] = {}
@@ -197,21 +198,19 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
 def _require(table: Table, wanted: Sequence[Column]) -> None:
     """Raise UnreadableFileError where a table lacks a column, or has two of that name."""
     for column in wanted:
-        if not isinstance(column, int) and table.names.count(column) > 1:
-            places = [str(k) for k, name in enumerate(table.names, 1) if name == column]
+        places = [str(k) for k, name in enumerate(table.names, 1) if name == column]
+        if len(places) > 1:
             raise UnreadableFileError(
                 table.path, f'{len(places)} columns have the name {column!r}: '
                 + (f'write the number of the right one, {" or ".join(places)}'
                    if isinstance(table, CsvTable) else 'rename one of them'))
-        if not isinstance(column, int) and table.place(column) is None:
-            if not table.names:
-                raise UnreadableFileError(
-                    table.path, f'no column {column!r}: it has no header, so columns must be '
-                    'numbers from 1')
-            close = meant(column, table.names)
+        if table.place(column) is None:
+            close = meant(str(column), table.names)
             raise UnreadableFileError(
                 table.path, f'no column {column!r}' + (f' (did you mean {close}?)' if close else '')
-                + '; it holds ' + (', '.join(sorted(table.names)[:MOST]) or 'none'))
+                + '; it holds ' + (', '.join(sorted(table.names)[:MOST]) or (
+                    f'{counted(getattr(table, "count", 0), "column")} without a header, must be '
+                    'numbers from 1')))
 
 
 def _seconds(stamps: Any, columns: RecordedColumns, count: int,

@@ -131,11 +131,14 @@ class Mechanism:
         found = []
         for k, name in enumerate(self.body_names):
             if k != self.carrier and self.masses[k] > 0:
-                _, frame = self.structure.links[name]
-                x, y, z = frame.inverse.of_point(self.inertial[k, 1:4] / self.inertial[k, 0])
-                found.append(BodyPlace(name, (round(float(x), 6), round(float(y), 6),
-                                              round(float(z), 6)), float(self.masses[k])))
+                x, y, z = (round(each, 6) for each in self.centre_of(name).tolist())
+                found.append(BodyPlace(name, (x, y, z), float(self.masses[k])))
         return tuple(found)
+
+    def centre_of(self, link: str) -> Array:
+        """Return the centre of mass of a body in the frame of one of its links, (3,) [m]."""
+        row, frame = self.structure.links[link]
+        return frame.inverse.of_point(self.by_joint[row, 1:4] / self.by_joint[row, 0])
 
     @property
     def moved_mass(self) -> float:

@@ -235,31 +235,29 @@ OF_JOINT = {
     'coulomb': Key('', 'dry friction over the load across the axis', '', lower=0, default=0.0),
     'radius': Key('', 'radius at which it acts; of a slide 1', 'm', lower=0, default=0.0)}
 POSE = '_pose'
-JOINTS, MOTORS = 'friction.joints.', 'friction.motors.'
-NAMED_BLOCKS: dict[str, dict[str, Key]] = {
-    'robot.loops.': OF_LOOP, JOINTS: OF_JOINT, 'robot.home.': {}, LOCKED: {},
-    MOTORS: {}}
+JOINTS, MOTORS, HOME = 'friction.joints.', 'friction.motors.', 'robot.home.'
+# A key for each name that the file gives, or the keys of a block for each.
+NAMED: dict[str, Key | dict[str, Key]] = {
+    'robot.loops.': OF_LOOP, JOINTS: OF_JOINT,
+    HOME: Key('', 'position near which the loops close', 'rad, m'),
+    LOCKED: Key('', 'position at which the joint is locked', 'rad, m'),
+    MOTORS: Key('', 'turns of a motor per turn of a joint, of motors that move several')}
+HOME_POSE = Key('', 'x y z qx qy qz qw in the base near which the loops close', 'm', size=7)
 
 
 def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
     """Return the keys of a robot below names that its file gives, out of those of the file."""
     found = {}
     for name in parameters:
-        if name.startswith('robot.home.'):
-            found[name] = (Key(name, 'x y z qx qy qz qw in the base near which the loops close',
-                               'm', size=7) if name.endswith(POSE) else
-                           Key(name, 'position near which the loops close', 'rad, m'))
-        if name.startswith(LOCKED):
-            found[name] = Key(name, 'position at which the joint is locked', 'rad, m')
-        if name.startswith(MOTORS):
-            found[name] = Key(name, 'turns of a motor per turn of a joint, of motors that move '
-                              'several', '')
-    for prefix, keys in NAMED_BLOCKS.items():
-        of_blocks = (name.removeprefix(prefix).partition('.')
-                     for name in parameters if name.startswith(prefix))
-        for own in dict.fromkeys(own for own, dot, _ in of_blocks if dot):
-            for last, key in keys.items():
-                found[f'{prefix}{own}.{last}'] = replace(key, name=f'{prefix}{own}.{last}')
+        prefix = next((prefix for prefix in NAMED if name.startswith(prefix)), '')
+        keys = NAMED.get(prefix)
+        if isinstance(keys, Key):
+            is_pose = prefix == HOME and name.endswith(POSE)
+            found[name] = replace(HOME_POSE if is_pose else keys, name=name)
+        elif keys and '.' in name.removeprefix(prefix):
+            block = prefix + name.removeprefix(prefix).partition('.')[0]
+            found.update((f'{block}.{last}', replace(key, name=f'{block}.{last}'))
+                         for last, key in keys.items())
     return found
 
 

@@ -15,7 +15,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
-    NAMED_BLOCKS,
+    NAMED,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
@@ -24,7 +24,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     title_of,
 )
-from pprs_dynamics.physics.model.ledger import NOT_KNOWN, read_steps
 from pprs_dynamics.physics.model.reference_keys import check_reference
 
 UNCERTAINTIES = 'uncertainties'
@@ -33,18 +32,11 @@ UNCERTAINTIES = 'uncertainties'
 def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, float]:
     """Return the standard deviation of each parameter of an effect, by drive.parameter.
 
-    What the file says; of files from before there was a block for it, what the ledger's last step
-    with the parameter says. A parameter of which neither says anything is taken as exact.
+    A parameter for which the file has none is taken as exact.
     """
     prefix = f'{UNCERTAINTIES}.{effect}.'
-    found: dict[str, float] = {}
-    for step in read_steps(values):
-        if step.effect == effect:
-            found.update((key, std) for key, std in zip(step.parameters, step.std, strict=False)
-                         if std < NOT_KNOWN)
-    found.update((key.removeprefix(prefix), float(std)) for key, std in values.items()
-                 if key.startswith(prefix))
-    return found
+    return {key.removeprefix(prefix): float(std) for key, std in values.items()
+            if key.startswith(prefix)}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
@@ -187,7 +179,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named: Iterable[str] = NAMED_BLOCKS if is_described(parameters) else ()
+    named: Iterable[str] = NAMED if is_described(parameters) else ()
     blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):

@@ -10,9 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSProfile
 
 from pprs_dynamics.ros.messages.status_codes import Code
 from pprs_dynamics.ros.node.parameters import node_parameter
+from pprs_dynamics.ros.node.qos import EVERY_MESSAGE, publisher
 from pprs_dynamics.ros.node.rclpy_internals import destroy_state_machine
 from pprs_dynamics.ros.node.status import StatusReporter
 
@@ -38,6 +40,7 @@ class ManagedNode(LifecycleNode):
         super().__init__(name, **options)
         self.state = 'unconfigured'
         self._failure: Exception | None = None
+        self._made: list[tuple[Callable[[Any], object], Any]] = []
         for service in self.services:
             if service.srv_name.endswith(CHANGE_STATE):
                 service.callback = self._refusing(service.callback)
@@ -46,9 +49,20 @@ class ManagedNode(LifecycleNode):
     def _create_topics(self) -> None:
         """Create what there is between configuration and cleanup."""
 
-    @abstractmethod
     def _destroy_topics(self) -> None:
-        """Take away whatever of it is there."""
+        """Destroy all that `_create_topics` has made."""
+        for destroy, entity in self._made:
+            destroy(entity)
+        self._made = []
+
+    def _publisher(self, kind: type, topic: str, profile: QoSProfile = EVERY_MESSAGE) -> Any:
+        """Create a publisher that lasts until cleanup."""
+        return self._until_cleanup(self.destroy_publisher, publisher(self, kind, topic, profile))
+
+    def _until_cleanup(self, destroy: Callable[[Any], object], entity: Any) -> Any:
+        """Return an entity that is destroyed at cleanup."""
+        self._made.append((destroy, entity))
+        return entity
 
     def _last_word(self) -> None:
         """Do what must be done before nothing is answered any more."""

@@ -30,6 +30,7 @@ from pprs_dynamics.ros.node.parameters import (
     overrides,
     with_hint,
 )
+from pprs_dynamics.ros.node.provenance import files_given
 
 MOST_CHANGES = 100  # that are remembered
 Checked = TypeVar('Checked')
@@ -168,6 +169,7 @@ class ModelParameters:
         given = overrides(node)
         declare_model(node, arguments)
         self._stays: dict[str, Any] = {}
+        self._files = files_given(arguments)
         self._node, self._declared = node, parameters
         self.model, self.node_values = follow(node, self._validated, self._apply)
         # Whatever is connected would be driven by the forces of another robot.
@@ -176,6 +178,12 @@ class ModelParameters:
         self._stays = self._staying(self.model, self.node_values)
         if not has_model(given):  # another robot would get wrong forces
             node.get_logger().warning('demo: the model is that of the paper\'s robot')
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Entries of `~/status`: files and hash of the model, and the number of its changes."""
+        changes = {} if self.history is None else {'changes': len(self.history)}
+        return {'model': {'files': self._files, 'sha256': self.model.fingerprint}, **changes}
 
     def _validated(self, changes: Iterable[Parameter]) -> tuple[DriveModel, dict[str, Any]]:
         self._refuse_foreign(changes)

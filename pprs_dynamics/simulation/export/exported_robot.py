@@ -452,8 +452,6 @@ def _drawn(robot: ExportedRobot) -> Mapping[int, list[Array]]:
 
 def _quaternion(R: Array) -> Array:
     """Return w x y z."""
-    from scipy.spatial.transform import Rotation
-
     return np.roll(Rotation.from_matrix(R).as_quat(), 1)
 
 
