@@ -147,8 +147,8 @@ class FeedforwardNode(ManagedNode):
             if name not in self._parts:
                 self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
 
-    def _destroy_topics(self) -> None:
-        super()._destroy_topics()
+    def destroy_topics(self) -> None:
+        super().destroy_topics()
         if self._watchdog is not None:
             self._watchdog.destroy()
         for each in (*self._parts.values(), self._current):

@@ -144,9 +144,9 @@ class MonitorNode(ManagedNode):
         for period, callback in clocks:
             self._until_cleanup(self.destroy_timer, steady_timer(self, period, callback))
 
-    def _destroy_topics(self) -> None:
+    def destroy_topics(self) -> None:
         self._stream.close()
-        super()._destroy_topics()
+        super().destroy_topics()
 
     def _use(self) -> None:
         self._stream.use_model(self._settings.model)

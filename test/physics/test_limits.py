@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -103,3 +105,14 @@ def test_what_is_allowed_is_finite_and_within_all_limits(limits: DriveLimits) ->
             assert not allowed(efforts, changed(middle(limits), drive, bad))
             assert not allowed(efforts, middle(limits), changed(rates, drive, bad))
             assert not allowed(efforts, middle(limits), rates, changed(rates, drive, bad))
+
+
+def test_the_smaller_of_two_limits_counts() -> None:
+    assert ARM.with_efforts([100.0, 100.0]).efforts.tolist() == [7.0, 100.0]
+
+
+def test_where_nothing_limits_efforts_an_infinite_one_is_not_allowed() -> None:
+    free = replace(ARM, efforts=np.full(2, np.inf))
+    rest = np.zeros((1, 2))
+    assert free.allow(np.array([[1e300, 0.0]]), (middle(ARM, 1), rest, rest))
+    assert not free.allow(np.array([[np.inf, 0.0]]), (middle(ARM, 1), rest, rest))

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.force_command import Feedforward
-from pprs_dynamics.ros.messages.trajectory_request import TrajectoryRequest
+from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import Timing, TrajectoryRequest
 
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject', 'ramp_time': 0.0}
@@ -189,3 +191,28 @@ def test_a_clock_that_is_set_back_multiplies_no_effect() -> None:
             fresh = Feedforward(REMEMBERS, OWN).answer(TrajectoryRequest(
                 request(1.0).motion, at, np.array([0])))
             np.testing.assert_allclose(found[0], fresh.effort[0], atol=1e-9)
+
+
+def test_an_effort_that_is_not_finite_is_refused_where_nothing_limits_it() -> None:
+    node = Feedforward(MODEL, {**OWN, 'feedforward_scale': np.nan})
+    with pytest.raises(Rejection, match='an effort that is not finite'):
+        node.answer(request())
+
+
+def test_a_pose_beyond_a_stroke_is_refused() -> None:
+    lifts = MODEL.drive_forces(request().motion).mechanism.position[0, 3:]
+    narrow = DriveModel.from_parameters({**MODEL.values, 'limits.lift_stroke': [
+        float(lifts.min()) + 0.01, float(lifts.max()) + 0.02]})
+    with pytest.raises(WorkspaceError, match='lift_'):
+        Feedforward(narrow, OWN).answer(request())
+
+
+@pytest.mark.parametrize(('timing', 'start'), [
+    (Timing(max_age=0.1), -0.2), (Timing(max_ahead=0.1), 0.2), (Timing(max_duration=0.01), 0.0)])
+def test_what_is_too_old_too_early_or_too_long_is_refused(timing: Timing, start: float) -> None:
+    now = 5_000_000_000
+    asked = TrajectoryRequest(request(1.0, 3).motion, now + round(1e9 * start),
+                              STEP * np.arange(3))
+    with pytest.raises(Rejection, match=timing._fields[np.flatnonzero(timing)[0]]):
+        timing.check(asked, now)
+    Timing(*(10.0 * value for value in timing)).check(asked, now)

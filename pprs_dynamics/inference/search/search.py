@@ -15,8 +15,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -108,11 +106,9 @@ class Search:
                         if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
                 for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
                     simplified(self.fits, fitted)
-            barred = self._inadmissible()
-            for fitted in barred:
+            for fitted in self._inadmissible():
                 self._fit(self._replacements(fitted))
-            for fitted in (self.best, *barred):
-                simplified(self.fits, fitted)
+            simplified(self.fits, self.best)
             if (not self.best.cost < before - LEAST_IMPROVEMENT
                     or (until_nonlinear and self.best.is_nonlinear)):
                 return
@@ -129,7 +125,6 @@ class Search:
         """Return new sets, fitted; bring those that may be the best to where they cost least."""
         new = [self.fits.evaluate(candidates) for candidates in sets
                if not self.fits.has(candidates) and self._is_bounded(candidates)]
-        new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
                                                   for component in fitted.blocks)]
@@ -142,21 +137,6 @@ class Search:
             if len(fitted.candidates) == len(fitted.effects) == 1:
                 simplified(self.fits, fitted)
         return new
-
-    def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
-        """Return sets with one effect more, where only constants make them worse than the best.
-
-        No noise takes a constant: what lacks nothing else is judged once it has it.
-        """
-        near = [fitted for fitted in sets if self._all_but_constants(fitted) < self.best.cost]
-        return [self.fits.evaluate(more) for fitted in near
-                for more in self.scan.proposals(fitted, 1) if self._is_bounded(more)]
-
-    def _all_but_constants(self, fitted: CandidateSet) -> float:
-        """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = fitted.fit.squares[:, 0] / fitted.fit.spectra[:, 0]
-        counts = self.fits.regression.counts[:, 0]
-        return fitted.cost - float(np.sum(np.maximum(squares - counts, 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:

@@ -49,7 +49,7 @@ class ManagedNode(LifecycleNode):
     def _create_topics(self) -> None:
         """Create what there is between configuration and cleanup."""
 
-    def _destroy_topics(self) -> None:
+    def destroy_topics(self) -> None:
         """Destroy all that `_create_topics` has made."""
         for destroy, entity in self._made:
             destroy(entity)
@@ -92,7 +92,7 @@ class ManagedNode(LifecycleNode):
             # rclpy would swallow it; a supervisor gets the transition's failure and this line.
             self._failure = error
             self.get_logger().error(f'cannot be configured: {error}')
-            self._destroy_topics()
+            self.destroy_topics()
             return TransitionCallbackReturn.FAILURE
         self._enter('inactive', 'INACTIVE', 'waiting to be activated')
         return super().on_configure(state)
@@ -110,14 +110,14 @@ class ManagedNode(LifecycleNode):
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take the topics away."""
-        self._destroy_topics()
+        self.destroy_topics()
         self._enter('unconfigured', 'UNCONFIGURED', 'waiting to be configured')
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End for good; the process goes on telling so until it is stopped."""
         self._last_word()
-        self._destroy_topics()
+        self.destroy_topics()
         self._enter('finalized', 'FINALIZED', 'shut down')
         return super().on_shutdown(state)
 
