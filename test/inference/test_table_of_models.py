@@ -16,11 +16,10 @@ from single_axis import AXIS, Effects, axis, axis_recording
 from pprs_dynamics.inference.diagnosis.answer import Answer, objection, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.candidates import Candidate, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import estimate
-from pprs_dynamics.inference.search.held_out import BLOCKS, HeldOut, PredictiveGain, hold_out
+from pprs_dynamics.inference.search.held_out import BLOCKS, HeldOut, PredictiveGain
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.inference.search.unknown import best_patterns
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -163,13 +162,3 @@ def test_a_fit_pays_for_the_numbers_that_it_moves() -> None:
     residuals, _ = measure_residuals(axis(), [axis_recording(axis())])
     free, moved = (HeldOut(1.0, np.full(BLOCKS, penalty), residuals) for penalty in (0.0, 3.0))
     assert free.gain(moved).gains.sum() == pytest.approx(-3.0 * BLOCKS / BLOCKS)
-
-
-def test_blocks_are_predicted_with_the_reversals_of_the_model() -> None:
-    """The width of reversals is unknown in every fit, and is no part of what is adopted."""
-    run = axis_recording(axis({'viscous_friction': {'coefficient': 3.0}},
-                              **{'friction.reversal_velocity': 0.1}), noise=0.01)
-    table = diagnose(axis(), [run]).selection
-    assert table is not None
-    fits = table.first
-    assert hold_out(fits, fits.evaluate(())).error > 0.9 * rms(measure_residuals(axis(), [run])[0])
