@@ -78,7 +78,6 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         own: Column = columns.time if columns.time is not None else next(
             (name for name in TIME_COLUMNS if name in table.names), 1)
         _require(table, [own])
-        _require(table, [own])
         shared = table.read([own])[0]
     stamps, epoch, prefix = np.zeros(0), 0, ''
     arrays: dict[tuple[str, str], Array] = {}

@@ -43,7 +43,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
-LEAST_GRAVITY = 1e-9  # [m/s^2] along a slide, below which its share is rounding
 
 
 @dataclass(frozen=True, eq=False)
