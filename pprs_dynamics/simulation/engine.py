@@ -88,6 +88,7 @@ class MechanismEngine:
         for name, (row, frame) in placed.items():
             if row and row not in of_row:
                 of_row[row], self._frames[row] = name, frame
+                self._prevent_short_cuts(spec.body(name))
         tool, t = structure.links[structure.tool], structure.tables
         sites = {TOOL: tool} | {
             f'{side}{k}': (int(row), Frame(R[k], p[k])) for side, rows, R, p in (
@@ -106,9 +107,7 @@ class MechanismEngine:
         self.data = self.state.data
         self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
         self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
-        # MuJoCo's short cuts hold for the inertia of the file alone.
-        for shortcut in ('body_sameframe', 'body_simple', 'dof_simplenum'):
-            getattr(self.model, shortcut)[:] = 0
+        self.model.body_sameframe[:] = 0  # MuJoCo's short cut for a centre at the origin
         self._names = {row: name for name, row in structure.rows.items()}
         hangs = np.eye(self.model.nbody)
         for number in range(self.model.nbody - 1, 0, -1):
@@ -145,6 +144,12 @@ class MechanismEngine:
         for name, values in of_model.items():
             getattr(self.model, name)[:] = values
         self.engine.mj_setConst(self.model, self.data)
+
+    def _prevent_short_cuts(self, body: Any) -> None:
+        """Add something off a body's frame, else MuJoCo's mass matrix is for its inertia alone."""
+        added = body.add_body(ipos=(0.1, 0.2, 0.3), iquat=(1.0, 0.1, 0.2, 0.3), mass=LEAST,
+                              inertia=(LEAST, 1.1 * LEAST, 1.2 * LEAST))
+        added.explicitinertial = True
 
     def _quaternion(self, R: Array) -> Array:
         quaternion = np.empty(4)
