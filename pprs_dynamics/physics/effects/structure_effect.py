@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, cached_property
 from math import inf
 from typing import Any, ClassVar, Self
 
@@ -137,9 +137,10 @@ class AddedBody(BodyEffect):
     has_extent = True
     idealised = False
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        super().__init__(values)
-        self._linear = self.to_coefficients(self.values)
+    @cached_property
+    def _linear(self) -> Mapping[str, float]:
+        """Its coefficients."""
+        return self.to_coefficients(self.values)
 
     @classmethod
     @cache
@@ -177,7 +178,7 @@ class AddedBody(BodyEffect):
         """Return the effect with these coefficients; those not given are zero."""
         every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
         effect = cls(cls.from_coefficients(every))
-        effect._linear = every  # a moment without a mass has no centre
+        vars(effect)['_linear'] = every  # a moment without a mass has no centre
         return effect
 
     @classmethod
