@@ -138,9 +138,8 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'session.json': self.session,
-                'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
-                **{work.__name__: work for work in (
+        return {'model.yaml': self.model, 'experiment.csv': self.experiment_file,
+                'live/machine': self.live_machine, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
     def changes(self) -> dict[str, Callable[[Fields], Response]]:
@@ -223,10 +222,6 @@ class Api:
         session, with_ticked = self.hub.the_session, query.get('ticked') == '1'
         return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
                               lambda path: session.export(path, with_ticked))
-
-    def session(self, query: Any) -> Response:
-        """Answer what `pprs workbench` goes on with."""
-        return self._download('session.json', 'application/json', self.hub.save)
 
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
