@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, fleet.to_dict())
     if options.report:
-        from pprs_dynamics.app.report.fleet_page import fleet_page
+        from pprs_dynamics.app.fleet.trend import fleet_page
 
         screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}', soft_wrap=True)
     return 0

@@ -30,11 +30,11 @@ from pprs_dynamics.app.workbench.masks import (
     quantities,
     quantity,
     region_mask,
+    robot_motion,
     shares_in,
     span_mask,
     spans_of,
 )
-from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
