@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Selections (brushing): samples in a span of time, or in a region of a scatter plot."""
+"""What is drawn of the recordings: marked samples, scatter plots, the robot in motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from pprs_dynamics.app.report.charts import extremes
 from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.ticks import Ticks
 from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
@@ -24,7 +23,7 @@ from pprs_dynamics.physics.model.skeleton import Skeleton
 MOST_POSES = 600
 
 
-def robot_motion(session: Session) -> tuple[Skeleton, dict[str, Array]]:
+def robot_motion(ticks: Ticks) -> tuple[Skeleton, dict[str, Array]]:
     """Return F poses of all recordings, one after the other.
 
     Returns
@@ -34,7 +33,6 @@ def robot_motion(session: Session) -> tuple[Skeleton, dict[str, Array]]:
         `time` of the residuals (F,) [s], the `points` of the skeleton, and the error of the drives
         `before` and `now`, (F, D): rms over the samples until the next pose [N].
     """
-    ticks = session.ticks
     data = ticks.fits.design.residuals
     chosen = np.unique(np.linspace(0, len(data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []

@@ -243,7 +243,7 @@ class Api:
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
-        drawn, arrays = robot_motion(self.hub.the_session)
+        drawn, arrays = robot_motion(self.hub.the_session.ticks)
         return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
                        'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 
