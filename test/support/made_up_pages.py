@@ -23,8 +23,9 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.app.api.adopt import adoption_page
 from pprs_dynamics.app.api.compare import comparison_page
 from pprs_dynamics.app.api.next_experiment import experiment_page
+from pprs_dynamics.app.commands.trend import fleet_page
 from pprs_dynamics.app.fleet.store import write_rows
-from pprs_dynamics.app.fleet.trend import fleet_page, fleet_trends
+from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.app.report.history_report import history_page
 from pprs_dynamics.app.report.page import Page

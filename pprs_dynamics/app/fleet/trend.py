@@ -18,47 +18,11 @@ import numpy as np
 
 from pprs_dynamics.app.fleet.recordings import pandas
 from pprs_dynamics.app.fleet.store import AUTO, MODEL, read_rows
-from pprs_dynamics.app.report import charts
-from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, with_uncertainty
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.system.plain_text import counted, displayed
-
-MOST_DRAWN, MOST_LISTED = 40, 50
-HEIGHT = 170  # [px] of a row
-
-
-def fleet_page(fleet: FleetTrends) -> Page:
-    """Return the page."""
-    changed = fleet.changed
-    count = len({trend.robot for trend in changed})
-    page = Page(f'Fleet: {count} of {len(fleet.robots)} robots changed')
-    first, *others = fleet.sentences()
-    page.text(first, 'lead')
-    page.bullets(others)
-    if changed:
-        drawn = changed[:MOST_DRAWN]
-        figure = charts.rows_over_time(len(drawn), 80 + HEIGHT * len(drawn), showlegend=False)
-        figure.update_xaxes(title_text='', ticksuffix='', hoverformat='%Y-%m-%d %H:%M')
-        for row, trend in enumerate(drawn, start=1):
-            figure.add_trace(charts.trace(
-                trend.time.dt.strftime('%Y-%m-%dT%H:%M:%S'), trend.value, trend.name,
-                charts.MODEL, mode='markers', hovertemplate=f'%{{y:.4g}} {trend.unit}'),
-                row=row, col=1)
-            figure.add_annotation(text=f'<b>{trend.robot}</b>, {trend.name} [{trend.unit}]',
-                                  x=0, y=1, xref='x domain', yref='y domain', xanchor='left',
-                                  yanchor='bottom', showarrow=False, row=row, col=1)
-            for step in trend.steps:
-                figure.add_vline(x=f'{step.time:%Y-%m-%dT%H:%M:%S}', row=row, col=1,
-                                 line={'color': charts.ERROR, 'dash': 'dash'})
-        page.figure(figure, 'Quantities that changed, the clearest first. Dashed: the first '
-                    'recording after a step.')
-    page.heading('Recordings without a result') if fleet.refused else None
-    page.bullets([f'{path}: {reason}' for path, reason in fleet.refused.items()][:MOST_LISTED])
-    return page
-
 
 FALSE_ALARMS = 0.01  # stores in which nothing changes and a step is reported
 LEAST_RECORDINGS, LEAST_SEGMENT = 8, 3  # of a series, and before and after a step
