@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
+from pprs_dynamics.physics.model.parameter_values import LISTS, UNCERTAINTIES
 from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.files import write_text
@@ -221,26 +221,17 @@ def _ledger_section(values: Mapping[str, Any]) -> list[str]:
 
 
 def _effects_block(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
-    found = {key: values[key] for key in sorted(
-        (key for key in values if key.startswith(('effects.', f'{UNCERTAINTIES}.'))),
-        key=lambda key: _rank(key, values))}
-    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
-
-
-def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return where a key of the effects stands: effects as added, drives in order.
+    """Return the blocks of effects and uncertainties, effects as added, drives in order.
 
     `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
     and a node takes no effect whose parameters it does not have.
     """
-    active, drives = values.get('effects.active') or (), values.get(
-        DRIVES_KEY, DRIVES)
-    block, name, *rest = key.split('.')
-    if block == 'effects' and not rest:
-        return (1,)
-    order = active.index(name) if name in active else len(active)
-    return (0 if block == 'effects' else 2, order,
-            list(drives).index(rest[0]) if rest[0] in drives else -1)
+    order = [*(values.get('effects.active') or ()), *values.get(DRIVES_KEY, DRIVES)]
+    keys = [key for key in values if key.startswith(('effects.', f'{UNCERTAINTIES}.'))]
+    found = {key: values[key] for key in sorted(keys, key=lambda key: (
+        key.startswith(UNCERTAINTIES), key in LISTS,
+        *(order.index(name) if name in order else len(order) for name in key.split('.')[1:3])))}
+    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
 
 
 def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
