@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference',
                          'details', 'report')
     parser.add_argument('--adopt-all', action='store_true',
-                        help='adopt the reported effects until nothing is missing')
+                        help='add the reported effects')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
                         help='then fit the base model again with the added effects, as pprs fit '
                         'does: to these recordings, or to the diagnosed ones')
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: Any) -> int:
-    """Adopt step by step, write the model file, and return the exit status.
+    """Adopt the reported effects, write the model file, and return the exit status.
 
     With nothing to adopt the file is written as it was; with a refusal, what was adopted before
     it, if anything.
