@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, nullcontext, suppress
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -42,12 +43,12 @@ from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.simulation.motion_files import write_motion
 from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
 HEARTBEAT = 15.0  # [s] between signs of life
+LOOK = 0.02  # [s] between looks at whether something has changed
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
 
@@ -71,7 +72,7 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
     """Return the application, guarded."""
     @asynccontextmanager
     async def lifespan(app: Any) -> AsyncIterator[None]:
-        hub.start(asyncio.get_running_loop())
+        hub.start()
         yield
         await run_in_threadpool(hub.stop)
 
@@ -210,12 +211,10 @@ class Api:
 
     def experiment_file(self, query: Any) -> Response:
         """Answer the poses, or the joints' positions, of the designed motion."""
-        session = self.hub.the_session
-        found = session.jobs.experiment
+        found = self.hub.the_session.jobs.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
-        return self._download('next.csv', 'text/csv', lambda path: write_motion(
-            path, session.ticks.fits.drives, found.motion))
+        return self._download('next.csv', 'text/csv', found.save)
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""
@@ -303,13 +302,10 @@ class Api:
     async def events(self, request: Request) -> Response:
         """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
-            queue = self.hub.subscribe()
-            try:
-                yield b'data: 0\n\n'
-                while not self.hub.is_over:
-                    with suppress(TimeoutError):
-                        await asyncio.wait_for(queue.get(), HEARTBEAT)
-                    yield b'data: %d\n\n' % self.hub.version
-            finally:
-                self.hub.unsubscribe(queue)
+            told, due = -1, 0.0
+            while not self.hub.is_over:
+                if self.hub.version != told or time.monotonic() > due:
+                    told, due = self.hub.version, time.monotonic() + HEARTBEAT
+                    yield b'data: %d\n\n' % told
+                await asyncio.sleep(LOOK)
         return StreamingResponse(lines(), media_type='text/event-stream')

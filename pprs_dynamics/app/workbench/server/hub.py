@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import re
 import time
@@ -35,7 +34,7 @@ IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
 class Hub:
-    """The session, its worker, and the subscribed browsers.
+    """The session, and its worker.
 
     Parameters
     ----------
@@ -57,20 +56,12 @@ class Hub:
         self._uploaded, self._lock, self._opening = 0, Lock(), Lock()
         self._work = Event()
         self.is_over = False
-        self._waiting: set[asyncio.Queue[None]] = set()
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._diagnosed: object = None  # once for each model, also where it fails
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
-    def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Start the worker; changes are announced in this loop."""
-        self._loop = loop
+    def start(self) -> None:
+        """Start the worker."""
         self._worker.start()
-
-    def end(self) -> None:
-        """End what browsers listen to; to be called in the loop, before connections are closed."""
-        self.is_over = True
-        self._put()
 
     def stop(self) -> None:
         """Call all work off."""
@@ -85,33 +76,6 @@ class Hub:
             self.live.close()
         self._worker.join(10)
         self._uploads.cleanup()
-
-    # Those who listen
-
-    def subscribe(self) -> asyncio.Queue[None]:
-        """Return a queue that gets an entry after changes; to be called in the loop."""
-        queue: asyncio.Queue[None] = asyncio.Queue(1)
-        self._waiting.add(queue)
-        return queue
-
-    def unsubscribe(self, queue: asyncio.Queue[None]) -> None:
-        """Listen no more."""
-        self._waiting.discard(queue)
-
-    def notify(self) -> None:
-        """Notify all browsers of a change."""
-        with self._lock:
-            self.version += 1
-        if self._loop is not None and not self._loop.is_closed():
-            with suppress(RuntimeError):  # it closes just now
-                self._loop.call_soon_threadsafe(self._put)
-
-    def _put(self) -> None:
-        for queue in self._waiting:
-            if not queue.full():
-                queue.put_nowait(None)
-
-    # The session
 
     @property
     def the_session(self) -> Session:
@@ -172,9 +136,14 @@ class Hub:
         self.session, self.failure = session, ''
         session.ticks.subscribe(self._changed)
 
+    def _notify(self) -> None:
+        """Let all browsers know of a change."""
+        with self._lock:
+            self.version += 1
+
     def _changed(self) -> None:
         self._work.set()
-        self.notify()
+        self._notify()
 
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
@@ -203,7 +172,7 @@ class Hub:
                     self.failure = ''
                 except Exception as error:
                     self._fail(error)
-                    self.notify()
+                    self._notify()
 
     def _find_mistakes(self) -> None:
         """Look at units and signs of what the command line gave, once the page stands."""
@@ -213,7 +182,7 @@ class Hub:
                 self.session.ticks.change_recordings(Inputs.checked)
             except PprsError as error:
                 self.failure = str(error)
-                self.notify()
+                self._notify()
 
     def _fail(self, error: Exception) -> None:
         """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
