@@ -21,7 +21,8 @@ from made_up_diagnosis import (
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.api.adopt import adoption_page
-from pprs_dynamics.app.api.compare import comparison_page
+from pprs_dynamics.app.api.compare import ComparisonResult
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.api.next_experiment import experiment_page
 from pprs_dynamics.app.commands.trend import fleet_page
 from pprs_dynamics.app.fleet.store import write_rows
@@ -57,9 +58,9 @@ def made_up_pages(folder: Path) -> dict[str, Page]:
     words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
     return {
         'diagnosis': diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap']),
-        'comparison': comparison_page(
-            DriveModel.load(), [], diagnosis.residuals, compare(diagnosis.residuals), ['so'],
-            ('Find out why', 'pprs diagnose run.mcap')),
+        'comparison': ComparisonResult(
+            Inputs(DriveModel.load(), {}, {}), diagnosis.residuals, compare(diagnosis.residuals),
+            ('so',)).page(),
         'adoption': _adoption(diagnosis.residuals), 'history': _history(),
         'experiment': _experiment(), 'fleet': _fleet(folder / 'store')}
 
