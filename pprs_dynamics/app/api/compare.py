@@ -128,7 +128,7 @@ class ComparisonResult(Result):
         recordings, statements = self.inputs.fitted, self.where
         page = Page('Model against measurement')
         page.text(self.verdict, 'lead')
-        page.sources(self.inputs.model.source, [recording.name for recording in recordings])
+        page.sources(self.inputs.model.source, *self.inputs.names)
         with page.columns():
             with page.block():
                 page.errors([ErrorRow(name, drive.rms, beside.drives.get(name) if beside else None,

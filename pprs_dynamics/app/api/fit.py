@@ -100,9 +100,7 @@ class FitResult(Result):
         page = Page('Base model')
         if self._headline:
             page.text(sentence(self._headline), 'lead')
-        page.sources(self.inputs.model.source,
-                     *([recording.name for recording in each]
-                       for each in (self.inputs.fitted, self.inputs.held_out)))
+        page.sources(self.inputs.model.source, *self.inputs.names)
         page.errors([ErrorRow(name, self.fit.before[name], after)
                      for name, after in self.fit.after.items()],
                     'Error, rms, before (grey) and with the fitted numbers (blue).')
