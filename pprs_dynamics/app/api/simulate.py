@@ -14,20 +14,39 @@ import numpy as np
 
 from pprs_dynamics.app.api.inputs import Model, Progress, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_over_time
-from pprs_dynamics.app.report.tables import recording_page, recording_rows, simulation_view
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits, common_unit
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
+from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 500.0  # [Hz], of the 3-PPRS
+
+
+def recording_rows(recording: Recording, units: Sequence[DriveUnits],
+                   ) -> dict[str, dict[str, Array]]:
+    """Return positions and efforts of every drive, by quantity."""
+    return {f'{what} [{common_unit(units, unit)}]': dict(
+        zip(recording.drives, values.T, strict=True)) for what, unit, values in (
+            ('position', 'm', recording.position), ('effort', 'N', recording.effort))}
+
+
+def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
+    """Return a page with positions and efforts of every drive over time."""
+    page = Page(recording.name)
+    page.figure(charts.stacked(recording.time, recording_rows(recording, units), 300),
+                'Position and effort of every drive.', over_time=True)
+    return page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -72,7 +91,8 @@ class SimulationResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""
-        return simulation_view(len(self.recording.time), self.rate, len(self.effects))
+        return (f'{len(self.recording.time)} samples at {self.rate:g} Hz, '
+                f'{counted(len(self.effects), "effect")} hidden')
 
     def page(self) -> Page:
         """Return a page: positions and efforts of every drive over time."""

@@ -302,7 +302,8 @@ class Api:
     async def events(self, request: Request) -> Response:
         """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
-            told, due = -1, 0.0
+            yield b'data: 0\n\n'
+            told, due = 0, 0.0
             while not self.hub.is_over:
                 if self.hub.version != told or time.monotonic() > due:
                     told, due = self.hub.version, time.monotonic() + HEARTBEAT
