@@ -42,9 +42,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.inference.diagnosis.sentences import sure_moments
-from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base, require_open_numbers
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
@@ -228,19 +226,14 @@ class AdoptionRunResult(Result):
         Model and recordings.
     run : AdoptionRun
         What was adopted and refused, one after the other.
-    refit : BaseFit, optional
-        Of the base model with the adopted effects.
     """
 
     inputs: Inputs
     run: AdoptionRun
-    refit: BaseFit | None = None
 
     @property
     def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
-        if self.refit is not None and self.refit.ratio < 1:
-            return self.refit.model
         return self.run.model
 
     @property
@@ -264,9 +257,7 @@ class AdoptionRunResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        refit = {} if self.refit is None else {'refit': {
-            **self.refit.to_dict(), 'taken': self.refit.ratio < 1, 'reason': self.refit.change}}
-        return {**self.run.to_dict(), **refit}
+        return self.run.to_dict()
 
     def view(self, details: bool = False) -> Any:
         """Return adopted and refused effects, and the reason to end, for the terminal."""
@@ -349,7 +340,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
 
 
 def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *,
-              refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
+              diagnosis: DiagnosisResult | None = None,
               topic: str | None = None, progress: Progress | None = None,
               reference: Given | None = None) -> AdoptionRunResult:
     """Diagnose and adopt until no effect is missing.
@@ -358,9 +349,6 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
     ----------
     model, recordings, validate, diagnosis, topic, progress, reference
         As in `adopt`.
-    refit : path, Recording, or a sequence of them, optional
-        To which the base model is then fitted again, as `fit` does, with the adopted effects. It is
-        taken if the error on other data falls. An empty sequence means `recordings`.
 
     Returns
     -------
@@ -368,25 +356,14 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
 
     Raises
     ------
-    FitError
-        Where there is nothing to fit again.
     PprsError
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
     inputs = inputs.since(reference, original(inputs.model))
-    again: list[Recording] = []
-    if refit is not None:
-        require_open_numbers(inputs.model)
-        again = Inputs.of(inputs.model, refit, inputs.held_out, topic,
-                          progress, as_it_is=inputs.as_it_is).fitted or inputs.fitted
-    run = adopt_effects(
+    return AdoptionRunResult(inputs, adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
-        None if diagnosis is None else diagnosis.diagnosis, inputs.reference)
-    if not again or not run.adopted:
-        return AdoptionRunResult(inputs, run)
-    return AdoptionRunResult(inputs, run, fit_base(
-        run.model, again, inputs.held_out, stage(progress, 'fitting the base')))
+        None if diagnosis is None else diagnosis.diagnosis, inputs.reference))
 
 
 def _plot(first: Adoption, last: Adoption) -> Figure:

@@ -94,7 +94,7 @@ class ComparisonResult(Result):
         marked = ('rms',) if len(comparison.unit) > 1 else ('rms', 'bias', 'peak', 'noise')
         return ('drive', *(f'{name} [{comparison.unit}]' if name in marked else name
                            for name in headings),
-                *([f'rms, {beside.name}'] if beside else []), 'grade'), [
+                *(['rms, other'] if beside else []), 'grade'), [
             (name, plain(drive.rms), percent(drive.relative),
              rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
              percent(drive.explained_variance),
@@ -117,6 +117,9 @@ class ComparisonResult(Result):
         if len(lines) > len(shown):
             parts.append(f'… and {len(lines) - len(shown)} more, with --details, --json or '
                          '--report')
+        if self.beside is not None:
+            parts.append(f'Other: {escape(self.beside.name)}, rms {plain(self.beside.rms)} '
+                         f'instead of {plain(self.rms)} {self.comparison.unit}')
         if self.comparison.is_beyond_noise:
             words, command = self._next
             parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]

@@ -182,7 +182,7 @@ class FirstModel:
 
 def first_model(
     robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
-    output: str | os.PathLike[str] = 'robot.yaml', *, base: str = '', tool: str = '',
+    output: str | os.PathLike[str] = 'robot.yaml', *, tool: str = '',
     drives: Sequence[str] = (), rate: float | None = None,
 ) -> FirstModel:
     """Return a first model file of a robot.
@@ -196,8 +196,8 @@ def first_model(
         quantity each are one recording.
     output : path
         Of the model file.
-    base, tool : str, optional
-        Links; without, the one that all hangs on, and the end of the longest chain.
+    tool : str, optional
+        Link that carries the load; without, the end of the longest chain.
     drives : sequence of str, optional
         Driven joints; without, those of the recording, or all up to the tool.
     rate : float, optional
@@ -232,8 +232,8 @@ def first_model(
         by_numbers = not all(map(_is_short_for, names, names.values()))
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
-    draft = FirstModel(path, Path(output), is_mjcf, description, base or root_of(description),
-                       branch, chosen, names, given, notes)
+    draft = FirstModel(path, Path(output), is_mjcf, description, root_of(description), branch,
+                        chosen, names, given, notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
