@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -534,18 +535,17 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
 
 def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
     """Return names of files with * for what they have in common: the name of the recording."""
-    stems = [file.name.partition('.')[0] for file in files.values()]
-    head = os.path.commonprefix(stems)  # noqa: RUF071 of letters
-    tail = os.path.commonprefix([stem[::-1] for stem in stems])[::-1]  # noqa: RUF071
+    parts = {kind: re.split('([^A-Za-z0-9])', file.name.partition('.')[0])
+             for kind, file in files.items()}
+    shared = next((at for at in (-1, 0) if len({part[at] for part in parts.values()}) == 1), None)
     found = {}
-    for (kind, file), stem in zip(files.items(), stems, strict=True):
-        if tail and not tail[0].isalpha():
-            star = stem.removesuffix(tail) + tail[:not tail[0].isalnum()] + '*'
-        elif head and not head[-1].isalpha():
-            star = '*' + head[len(head) - (not head[-1].isalnum()):] + stem.removeprefix(head)
+    for kind, part in parts.items():
+        ending = files[kind].name.removeprefix(''.join(part))
+        if shared is None:
+            part.append('*')
         else:
-            star = f'{stem}*'
-        found[kind] = star + file.name.removeprefix(stem)
+            part[shared] = '*'
+        found[kind] = ''.join(part) + ending
     return found
 
 

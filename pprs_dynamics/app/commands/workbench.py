@@ -14,8 +14,7 @@ from typing import Any
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import add_shared, whole
-from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
+from pprs_dynamics.app.workbench.server.hub import Hub, Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.drive_model import DriveModel
