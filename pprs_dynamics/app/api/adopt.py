@@ -137,7 +137,7 @@ class AdoptionResult(Result):
         return ('held-out recordings' if self.adoption.held_out_on == VALIDATION
                 else 'held-out blocks')
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return answer, fall of the error and first values for the terminal, in 20 lines."""
         answer = self.adoption
         word, colour = (('refused', 'red') if not answer.adopted else
@@ -259,13 +259,12 @@ class AdoptionRunResult(Result):
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
         return self.run.to_dict()
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return adopted and refused effects, and the reason to end, for the terminal."""
-        results = [AdoptionResult(self.inputs, step) for step in self.run.steps]
         following = [shell_command(self.inputs.files.command(
             'next-experiment', '--output', 'next.csv'))] if self.run.ended == AMBIGUOUS else []
         return stacked(
-            *(result.view() if details else escape(result.headline) for result in results),
+            *(escape(AdoptionResult(self.inputs, step).headline) for step in self.run.steps),
             f'[bold]{self.run.ended}[/]: {escape(self.run.reason)}{":" * len(following)}',
             *following)
 

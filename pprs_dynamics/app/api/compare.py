@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 NOWHERE = 'The error is not concentrated in any region.'
-FIRST = 3  # statements on the first screen, and without --details
+FIRST = 3  # statements in the terminal, and on the first screen of the page
 COLOURS = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
 
 
@@ -103,20 +103,17 @@ class ComparisonResult(Result):
              drive.grade)
             for name, drive in comparison.drives.items()]
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return how wrong the model is, where, and what to do next, for the terminal."""
         headings, rows = self._drives()
-        last = len(headings) if details else -1
-        table = text_table(headings[:last], [
-            (f'[{COLOURS[row[-1]]}]{escape(row[0])}[/]', *row[1:last]) for row in rows],
+        table = text_table(headings[:-1], [
+            (f'[{COLOURS[row[-1]]}]{escape(row[0])}[/]', *row[1:-1]) for row in rows],
             frame='none')
-        lines = [f'{number}. {statement.text}'
+        lines = [f'{number}. {escape(statement.text)}'
                  for number, statement in enumerate(self.where, start=1)]
-        shown = lines if details else lines[:FIRST]
-        parts = [table, escape(self.verdict), *map(escape, shown or [NOWHERE])]
-        if len(lines) > len(shown):
-            parts.append(f'… and {len(lines) - len(shown)} more, with --details, --json or '
-                         '--report')
+        parts = [table, escape(self.verdict), *(lines[:FIRST] or [NOWHERE])]
+        if len(lines) > FIRST:
+            parts.append(f'… and {len(lines) - FIRST} more, with --json or --report')
         if self.beside is not None:
             parts.append(f'Other: {escape(self.beside.name)}, rms {plain(self.beside.rms)} '
                          f'instead of {plain(self.rms)} {self.comparison.unit}')

@@ -87,13 +87,12 @@ class FitResult(Result):
              plain(2 * number.std) if isfinite(number.std) else '', number.unit)
             for number in self.fit.numbers]
 
-    def view(self, details: bool = False) -> Any:
-        """Return errors and notes for the terminal; with `details` every number."""
+    def view(self) -> Any:
+        """Return errors and notes for the terminal; the page has every number."""
         errors = text_table(*plain_rows(self._errors), right=(2, 3, 4),
                             title=f'Error, rms; held out: {HELD_OUT[self.fit.held_out_on]}')
-        numbers = [text_table(*plain_rows(self._numbers), right=(2, 3, 4))] if details else []
         return stacked(*filter(None, [escape(self._headline)]), errors,
-                       *map(escape, self.fit.notes), *numbers)
+                       *map(escape, self.fit.notes))
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""

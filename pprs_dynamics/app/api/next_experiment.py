@@ -127,7 +127,7 @@ class ExperimentResult(Result):
         """Every limit with the share of it that is used, the fullest first."""
         return sorted(self.design.limits.items(), key=lambda item: -item[1])
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return what a motion is for, what it promises, and which limits it uses."""
         parts: list[Any] = [f'[bold]{escape(self.design.text)}[/]']
         if self.design.contests:

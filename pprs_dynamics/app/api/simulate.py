@@ -89,7 +89,7 @@ class SimulationResult(Result):
         return {'samples': len(self.recording.time), 'rate': self.rate, 'seed': self.seed,
                 'effects': list(self.effects)}
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""
         return (f'{len(self.recording.time)} samples at {self.rate:g} Hz, '
                 f'{counted(len(self.effects), "effect")} hidden')
@@ -114,9 +114,9 @@ class SimulationResult(Result):
 
 
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
-             scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
-             path_seed: int = 0, noise: float | None = None, thermometers: bool = False,
-             link_encoders: bool = False, progress: Progress | None = None) -> SimulationResult:
+             motion: PlatformMotion | None = None, duration: float = 40.0,
+             path_seed: int = 0, noise: float | None = None,
+             progress: Progress | None = None) -> SimulationResult:
     """Record a robot of a physics engine that has effects which its model does not know of.
 
     Parameters
@@ -126,8 +126,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         Names of effects, drawn from the seed; 'random' draws the names, too.
     seed : int
         Of effects and noise.
-    scale : float
-        Multiplies the strength of the effects.
     motion : PlatformMotion, optional
         Of a 3-PPRS at 500 Hz; by default, and of other robots always, a random one.
     duration : float
@@ -136,8 +134,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         Of the random motion.
     noise : float, optional
         Standard deviation of the efforts [N m, N]: by default half a percent of the largest.
-    thermometers, link_encoders : bool
-        Whether they are recorded where no effect needs them.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -168,8 +164,9 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
             nominal = _of_drives(found, _excitation(duration, 0))
         motion = _excitation(duration, path_seed) if motion is None else motion
         drives = _of_drives(found, motion)
-    run = simulate_mechanism(robot, names, seed, scale, noise, duration, path_seed, share_done,
-                             thermometers, link_encoders, drives, nominal)
+    run = simulate_mechanism(
+        robot, names, seed, noise=noise, duration=duration, path_seed=path_seed,
+        progress=share_done, motion=drives, nominal=nominal)
     time = run.motion.time
     assert time is not None
     recording = Recording.from_arrays('simulated', time, run.position, None, run.effort,

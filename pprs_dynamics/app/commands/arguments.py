@@ -112,7 +112,6 @@ SHARED: dict[str, dict[str, Any]] = {
     'reference': {'metavar': 'RECORDING', 'nargs': '*', 'help': 'report what has changed since '
                   'these recordings of the healthy machine (none named: those that the model file '
                   'names)'},
-    'details': {'action': 'store_true', 'help': 'print all findings, tables and values'},
     'report': {'metavar': 'FILE.html', 'type': output_file(*PAGE),
                'help': 'write a page with all figures'},
     'output': {'metavar': 'FILE.yaml', 'type': output_file(*MODEL), 'help': 'model file to write'},

@@ -21,7 +21,9 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference',
-                         'details', 'report')
+                         'report')
+    parser.add_argument('--details', action='store_true',
+                        help='print all findings, tables and values')
     parser.add_argument('--adopt-all', action='store_true',
                         help='adopt the reported effects until nothing is missing')
     arguments.add_shared(parser, 'output', required=False,
@@ -50,7 +52,7 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
     with staged_bar(screen) as progress:
         result = adopt_all(inputs.model, inputs, diagnosis=diagnosis, progress=progress,
                            reference=options.reference)
-    screen.print(result.view(options.details))
+    screen.print(result.view())
     if options.json:
         write_json(options.json, {**diagnosis.to_dict(), 'adoption': result.to_dict()})
     count = len(result.run.adopted)
