@@ -158,6 +158,11 @@ class Effect(ABC):
             What `initial_memory` returned, advanced in place to the last sample.
         """
 
+    def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
+        """Return the measured effort where the drives apply `effort`, (N, D), if it is a sensor's.
+        """
+        return effort + self.force(state, memory)
+
     def initial_memory(self, start: float | None = None) -> Any:
         """Return a fresh memory, or None for an effect without one.
 

@@ -35,7 +35,6 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
 )
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
 from pprs_dynamics.physics.mechanism.tree_equations import (
@@ -356,27 +355,20 @@ class DriveModel:
         EffectError
             Where an effect of another package fails.
         """
-        if type(motion) is not self._usual_motion:
-            self._require_motion(motion)
+        self._require_motion(motion)
         found = self._one_pass(motion, None if state is None else state.closed)
         if found is None:
             # Very large numbers overflow; users of the result check that it is finite.
             with np.errstate(over='ignore', invalid='ignore'):
-                if state is None:
-                    return self.forces_at(self.mechanism(motion))
-                mechanism = self.mechanism(motion, state.closed)
+                mechanism = self.mechanism(motion, None if state is None else state.closed)
                 found = self.forces_at(mechanism, state)
-            self.robot.remember(mechanism, state.closed)
+            if state is not None:
+                self.robot.remember(mechanism, state.closed)
         elif self._added:
             return self._with_effects(self._added, found.parts, found.mechanism, state)
         elif state is not None:
             state.advance(motion.time, self.initial_state)
         return found
-
-    @cached_property
-    def _usual_motion(self) -> type | None:
-        """The kind of motion whose shape needs no check."""
-        return None if self.moves_joints else PlatformMotion
 
     @cached_property
     def _own_parameters(self) -> Any:
@@ -536,10 +528,7 @@ class DriveModel:
         parts, total = dict(forces.parts), forces.total
         state = self.initial_state() if state is None else state
         for effect in sensors:
-            memory = state.memories[effect.name]
-            after = (effect.measured(total, mechanism, memory)
-                     if isinstance(effect, MeasurementEffect)
-                     else total + effect.force(mechanism, memory))
+            after = effect.measured(total, mechanism, state.memories[effect.name])
             parts[effect.name], total = after - total, after
         return Forces(total, parts, mechanism)
 
