@@ -34,22 +34,10 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
     ModelJointFriction,
 )
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    ARMATURE,
-    COEFFICIENT,
-    COULOMB,
-    DRIVE_FRICTION,
-    JOINT_EFFORT,
-    OF_DRIVE,
-    OFFSET,
-    RIGID,
-    TOTAL,
-    VISCOUS,
-    WIDTH,
-)
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
@@ -376,14 +364,14 @@ class DriveModel:
 
         Effects that change the bodies, and the second approach to friction, Eq. (13), have none.
         """
-        drives = np.zeros((OF_DRIVE, len(self.drives)))
-        drives[ARMATURE], drives[WIDTH] = self.robot.armature, self.reversal.velocity
+        drives = np.zeros((rows.OF_DRIVE, len(self.drives)))
+        drives[rows.ARMATURE], drives[rows.WIDTH] = self.robot.armature, self.reversal.velocity
         for effect in self.effects:
             if isinstance(effect, DriveFriction):
-                drives[VISCOUS], drives[COULOMB] = effect.viscous, effect.coulomb
-                drives[COEFFICIENT] = effect.coefficient
+                drives[rows.VISCOUS], drives[rows.COULOMB] = effect.viscous, effect.coulomb
+                drives[rows.COEFFICIENT] = effect.coefficient
             elif isinstance(effect, DriveOffset):
-                drives[OFFSET] = effect.value
+                drives[rows.OFFSET] = effect.value
             elif isinstance(effect, BodyEffect | IndependentChainsFriction):
                 return None
         return self.robot.friction_parameters(self._joint_friction, drives)
@@ -398,19 +386,19 @@ class DriveModel:
         found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
                                                                     bool(self._added))
         return None if found is None else Forces(
-            found.efforts[TOTAL], lambda: self._own_parts(found.efforts),
+            found.efforts[rows.TOTAL], lambda: self._own_parts(found.efforts),
             lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),
             found.motion)
 
     def _own_parts(self, efforts: Array) -> dict[str, Array]:
         """Return the parts of efforts by name, in the order of the effects."""
-        parts = {RIGID_BODY: efforts[RIGID]}
+        parts = {RIGID_BODY: efforts[rows.RIGID]}
         for effect in self.effects:
             if isinstance(effect, DriveOffset):
-                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[TOTAL])
+                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[rows.TOTAL])
             elif isinstance(effect, OWN):
                 parts[effect.name] = efforts[
-                    DRIVE_FRICTION if isinstance(effect, DriveFriction) else JOINT_EFFORT]
+                    rows.DRIVE_FRICTION if isinstance(effect, DriveFriction) else rows.JOINT_EFFORT]
         return parts
 
     @cached_property
