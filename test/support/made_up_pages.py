@@ -20,13 +20,13 @@ from made_up_diagnosis import (
 )
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.app.api.adopt import adoption_page
+from pprs_dynamics.app.api.compare import comparison_page
+from pprs_dynamics.app.api.next_experiment import experiment_page
+from pprs_dynamics.app.commands.trend import fleet_page
 from pprs_dynamics.app.fleet.store import write_rows
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.report.adoption_report import adoption_page
-from pprs_dynamics.app.report.comparison_report import comparison_page
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
-from pprs_dynamics.app.report.experiment_report import experiment_page
-from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.history_report import history_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES

@@ -290,10 +290,6 @@ class Ticks:
     def _moment(self, deed: str) -> Moment:
         return Moment(deed, self.model, self.view.ticks, self.fitted_since)
 
-    def forget(self) -> None:
-        """Forget what was done until now."""
-        self._done, self._undone = [], []
-
     def back(self, revision: int | None = None) -> ViewState:
         """Undo the last tick, value or adoption.
 

@@ -140,6 +140,7 @@ class Sensitivities:
                             for effect in catalogue().values())
         self.known = frozenset[str]()
         self.is_planned = False
+        self._steps: dict[type[BodyEffect], list[BodyEffect]] = {}  # by coefficient
         self._inertial: dict[type[AddedBody], Array] = {}
         self._links: tuple[Any, Array] = None, np.empty(0)  # state, and its regressor
         self._own: tuple[Any, Array] = None, np.empty(0)  # state, and efforts of the model there
@@ -185,6 +186,7 @@ class Sensitivities:
         columns: dict[str, Array] = {}
         if NUMBERS not in self.known:
             columns[NUMBERS] = self._of_numbers(forces, samples)
+        if OF_DRIVES not in self.known:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
                 np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
@@ -336,11 +338,13 @@ class Sensitivities:
             if self.is_planned and self.model.robot.structure is not None:
                 rigid = self._of_rigid_bodies(effect, state)
                 return rigid, rigid
-        values = {} if present is None else effect.to_coefficients(present.values)
+        if effect not in self._steps:
+            values = {} if present is None else effect.to_coefficients(present.values)
+            self._steps[effect] = [effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
+                                   for c in effect.coefficients]
         before = self._own_efforts(state)
         full, bare = [], []
-        for c in effect.coefficients:
-            moved = effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
+        for c, moved in zip(effect.coefficients, self._steps[effect], strict=True):
             found = moved.apply(state) if present is None else self._at(replace(
                 self.model, effects=tuple(moved if one is present else one
                                           for one in self.model.effects)), state)

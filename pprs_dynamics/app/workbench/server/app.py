@@ -30,11 +30,11 @@ from pprs_dynamics.app.workbench.masks import (
     quantities,
     quantity,
     region_mask,
+    robot_motion,
     shares_in,
     span_mask,
     spans_of,
 )
-from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
@@ -138,9 +138,8 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'session.json': self.session,
-                'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
-                **{work.__name__: work for work in (
+        return {'model.yaml': self.model, 'experiment.csv': self.experiment_file,
+                'live/machine': self.live_machine, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
     def changes(self) -> dict[str, Callable[[Fields], Response]]:
@@ -224,10 +223,6 @@ class Api:
         return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
                               lambda path: session.export(path, with_ticked))
 
-    def session(self, query: Any) -> Response:
-        """Answer what `pprs workbench` goes on with."""
-        return self._download('session.json', 'application/json', self.hub.save)
-
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
         with TemporaryDirectory(prefix='pprs_workbench_') as folder:
@@ -248,7 +243,7 @@ class Api:
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
-        drawn, arrays = robot_motion(self.hub.the_session)
+        drawn, arrays = robot_motion(self.hub.the_session.ticks)
         return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
                        'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 

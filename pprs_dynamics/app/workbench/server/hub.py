@@ -22,7 +22,6 @@ from pprs_dynamics.app.fleet.recordings import ENDINGS
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session import Session
-from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
@@ -45,13 +44,10 @@ class Hub:
     offered : Offered
         What browsers may choose from.
     live : LiveNodes, optional
-    saved : SavedSession, optional
-        What is taken over once the session has begun.
     """
 
-    def __init__(self, inputs: Inputs, offered: Offered, live: LiveNodes | None = None,
-                 saved: SavedSession | None = None) -> None:
-        self.inputs, self.offered, self.live, self.saved = inputs, offered, live, saved
+    def __init__(self, inputs: Inputs, offered: Offered, live: LiveNodes | None = None) -> None:
+        self.inputs, self.offered, self.live = inputs, offered, live
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -172,17 +168,6 @@ class Hub:
                 self._uploaded -= 1
             raise
 
-    def save(self, path: Path) -> None:
-        """Write the session; errors as `Session.save`."""
-        session = self.the_session
-        inputs = session.ticks.inputs
-        for name in (*inputs.recordings, *inputs.validation):
-            if Path(name).is_relative_to(self._uploads.name):
-                raise SessionError(f'{Path(name).name} came from the browser and is gone with the '
-                                   'server, must be opened from a folder for the session to be '
-                                   'saved')
-        session.save(path)
-
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
         session.ticks.subscribe(self._changed)
@@ -196,10 +181,7 @@ class Hub:
         try:
             with self._opening:  # what a browser opens meanwhile comes on top
                 if self.inputs.recordings:
-                    begun = Session.of(self.inputs)
-                    if self.saved is not None:
-                        begun.resume(self.saved)
-                    self._use(begun)
+                    self._use(Session.of(self.inputs))
                     self._is_unjudged = True
         except Exception as error:
             self._fail(error)
