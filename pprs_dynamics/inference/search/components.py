@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -93,6 +94,22 @@ class DriveComponents:
             first += len(rows)
             parts.append(rows)
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
+
+    def around(self, regression: Regression) -> DriveComponents:
+        """Return the same effects for the same samples around another operating point.
+
+        Their rows stay, as they only propose.
+        """
+        found = copy(self)
+        found.regression, found.series = regression, regression.series[self.d]
+        if 'score_test' in vars(self):
+            found.score_test = self.score_test.around(regression)
+        return found
+
+    def release(self) -> None:
+        """Let go of products that only further scans would need."""
+        if 'score_test' in vars(self):
+            self.score_test = self.score_test.around(self.regression)
 
     def rows_of(self, effect: type[DriveEffect]) -> Array:
         """Return what an effect does in all shapes tried, (k, n), transformed."""
@@ -397,5 +414,6 @@ class Components:
 
     def release(self) -> None:
         """Let go of what scans need; it is computed again if it is asked for."""
-        for one in (self, *self.local.values()):
-            vars(one).pop('score_test', None)
+        vars(self).pop('score_test', None)
+        for local in self.local.values():
+            local.release()

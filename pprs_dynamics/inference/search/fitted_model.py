@@ -154,8 +154,7 @@ def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, Cand
         point = next_operating_point(fits, fitted)
         if point is None:
             break
-        fits = FittedSets(fits.design.around(point, alone=True), fits.decisions,
-                          fits.regression.error_scale)
+        fits = fits.around(point, alone=True)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
     return fits, fitted
 
