@@ -87,22 +87,19 @@ class FitResult(Result):
              plain(2 * number.std) if isfinite(number.std) else '', number.unit)
             for number in self.fit.numbers]
 
-    def view(self, details: bool = False) -> Any:
-        """Return errors and notes for the terminal; with `details` every number."""
+    def view(self) -> Any:
+        """Return errors and notes for the terminal; the page has every number."""
         errors = text_table(*plain_rows(self._errors), right=(2, 3, 4),
                             title=f'Error, rms; held out: {HELD_OUT[self.fit.held_out_on]}')
-        numbers = [text_table(*plain_rows(self._numbers), right=(2, 3, 4))] if details else []
         return stacked(*filter(None, [escape(self._headline)]), errors,
-                       *map(escape, self.fit.notes), *numbers)
+                       *map(escape, self.fit.notes))
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""
         page = Page('Base model')
         if self._headline:
             page.text(sentence(self._headline), 'lead')
-        page.sources(self.inputs.model.source,
-                     *([recording.name for recording in each]
-                       for each in (self.inputs.fitted, self.inputs.held_out)))
+        page.sources(self.inputs.model.source, *self.inputs.names)
         page.errors([ErrorRow(name, self.fit.before[name], after)
                      for name, after in self.fit.after.items()],
                     'Error, rms, before (grey) and with the fitted numbers (blue).')

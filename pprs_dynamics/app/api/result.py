@@ -78,8 +78,8 @@ class Result(ABC):
         """Return what the command writes with --json."""
 
     @abstractmethod
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows, for rich's console; all there is with `details`.
+    def view(self) -> Any:
+        """Return what the terminal shows, for rich's console.
 
         Raises
         ------

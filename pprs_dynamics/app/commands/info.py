@@ -11,10 +11,11 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
+from pprs_dynamics.app.api.simulate import recording_page
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared
 from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.report.tables import reading_table, recording_page
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
+from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
     OtherReading,
@@ -142,3 +143,38 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
     return recordings, summaries
+
+
+def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
+    """Return how the columns of a recording are read: column, drive, quantity, unit, range."""
+    rows = []
+    joints = recorded.joints or recorded.names
+    for drive, joint, units in zip(recorded.names, joints, recorded.units, strict=True):
+        found = summary.drives[drive]
+        columns = (DriveColumns() if recorded.columns is None
+                   else recorded.columns.drives.get(drive, DriveColumns()))
+        current = 'current' in columns.names
+        in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
+                         for finding in summary.findings)
+        for quantity, bounds, unit, factor in (
+                ('position', found.position, units.position, columns.position_scale),
+                ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
+                ('current' if current else 'effort', found.effort,
+                 'A' if in_amperes else units.effort, columns.effort_scale),
+                *((name, each, units.of(CHANNELS[name]), 1.0)
+                  for name, each in found.channels.items())):
+            if bounds is not None:
+                column = columns.names.get(quantity, f'{joint}/{quantity}')
+                rows.append((escape(str(column)), escape(drive), quantity, unit + (
+                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds) + (
+                        f' ({found.measured:.1%} measured)'
+                        if quantity in ('current', 'effort') and found.measured < 1 else '')))
+    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows, right=(),
+                      caption=escape(summary.source), title=escape(
+                          f'{summary.name}: {summary.used} of {summary.samples} samples in '
+                          f'{counted(len(summary.segments), "segment")}, '
+                          f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
+
+
+def _span(bounds: tuple[float, float] | None) -> str:
+    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'

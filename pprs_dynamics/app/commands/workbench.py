@@ -14,8 +14,7 @@ from typing import Any
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import add_shared, whole
-from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
+from pprs_dynamics.app.workbench.server.hub import Hub, Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -39,16 +38,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='subscribe to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
                         help='topic of --live (default: that of --topic, else joint_states)')
-    parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
-                        help='namespace of the topic and nodes of --live')
     parser.add_argument('--port', type=whole(0, 65535), default=0,
                         help='port of the server (default: any free one)')
     parser.add_argument('--host', type=_one_address, default=HOST,
                         help=f'address of the server (default {HOST}: this machine only)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
     parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='ARGUMENT',
-                        help='arguments of the node of --live, as of any ROS 2 node: remappings, '
-                        'joint_prefix, use_sim_time, QoS; must come last')
+                        help='arguments of the node of --live, as of any ROS 2 node: namespace (-r '
+                        '__ns:=/NAME), remappings, joint_prefix, use_sim_time, QoS; must come last')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -85,5 +82,4 @@ def _live(options: argparse.Namespace, model: DriveModel) -> Any:
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
     return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                     'monitor', 'feedforward', options.namespace,
-                     ['--ros-args', *options.ros_args])
+                     arguments=['--ros-args', *options.ros_args])

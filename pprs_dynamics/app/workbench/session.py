@@ -153,7 +153,7 @@ class Session:
                 'undoes': ticks.undoes, 'redoes': ticks.redoes,
                 'jobs': {kind: job.to_dict() for kind, job in jobs.of_kind.items()},
                 'adoption': for_json(jobs.adoption.to_dict()) if jobs.adoption else None,
-                'experiment': for_json(jobs.experiment.promise) if jobs.experiment else None,
+                'experiment': for_json(jobs.experiment.to_dict()) if jobs.experiment else None,
                 'recordings': view_state.recordings_to_dict(
                     ticks.inputs.recordings, fits, view.residual),
                 'held_out': [{'key': key, 'name': recording.name}

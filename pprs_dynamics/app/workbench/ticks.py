@@ -250,9 +250,9 @@ class Ticks:
             view = self.settle()
         if not view.ticks:
             return self.model
-        if view.exact is None:
+        if view.model is None:
             raise SessionError(f'no model has these values: {view.notice}')
-        return view.exact.model
+        return view.model
 
     # Undo
 
