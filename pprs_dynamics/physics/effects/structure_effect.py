@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from math import inf
 from typing import Any, ClassVar, Self
@@ -15,9 +13,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter, Product
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, StructureLoad
+
+# Linear parameters and variants of an effect at one place.
+OfPlace = tuple[tuple[Parameter, ...], Sequence[tuple[str, ...]]]
 
 
 class StructureEffect(CatalogueEffect):
@@ -29,20 +30,66 @@ class StructureEffect(CatalogueEffect):
         By name of the parameter.
     """
 
+    # Where it acts on a robot: the name of each link or joint, and what a law has to know of it.
+    places: ClassVar[tuple[Any, ...]] = ()
+
     def __init__(self, values: Mapping[str, float]) -> None:
         self.values = dict(values)
+        self.exact = self.to_coefficients(self.values)
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
-                  turning: Collection[str] | None = None) -> Self:
-        """Build the effect from `{parameter: value}`."""
-        return cls(cls._checked(f'effects.{cls.name}', values, complete))
+    @cache
+    def at_places(cls, places: tuple[Any, ...], alike: tuple[tuple[str, ...], ...] = (),
+                  moved: float = inf) -> type[Self]:
+        """Return the effect with its parameters at each place of a robot.
+
+        Parameters
+        ----------
+        places : tuple of tuple
+            A name, and what a law has to know of the place.
+        alike : tuple of tuple of str
+            Names of places at which the effect does the same; the first represents all.
+        moved : float
+            Mass of all that the robot moves [kg].
+        """
+        stand_ins = {name for group in alike for name in group[1:]}
+        each = [cls.of_place(place, place[0] in stand_ins, moved) for place in places]
+        return type(cls.__name__, (cls,), {
+            'places': places, 'linear': tuple(p for linear, _ in each for p in linear),
+            'variants': tuple(names for _, variants in each for names in variants),
+            'alike': alike, '__module__': cls.__module__,
+            'made_by': (cls.at_places, (places, alike, moved))})
+
+    @classmethod
+    def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
+        """Return linear parameters and variants at a place; see `at_places`.
+
+        Parameters
+        ----------
+        place : tuple
+        is_alike : bool
+            Whether an earlier place represents it.
+        moved : float
+            [kg]
+        """
+        return (), ()
+
+    @classmethod
+    def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
+        """Return the checked values by name of the parameter."""
+        return cls._checked(f'effects.{cls.name}', values, is_complete)
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:
-        """Return the effect with these coefficients; those not given are zero."""
+        """Return the effect with exactly these coefficients; those not given are zero.
+
+        Parameters may not exist for them: a moment without a mass has no centre.
+        """
         every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
-        return cls(cls.from_coefficients(every))
+        effect = cls(cls.from_coefficients(every))
+        effect.exact = every
+        return effect
 
 
 class BodyEffect(StructureEffect):
@@ -82,11 +129,7 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 
 
 class PassiveJointEffect(StructureEffect):
-    """Friction in the passive joints: a force on top of the rigid body's."""
-
-    @abstractmethod
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the effect's drive forces [N, N m], (N, D)."""
+    """Friction in the passive joints: a force in addition to the rigid body's."""
 
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
@@ -96,31 +139,26 @@ LARGEST = 1e3  # [kg]
 
 
 def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
-                    ) -> tuple[Parameter, ...]:
-    """Return the parameters of a body on a link of some mass; `prefix` is before their names."""
-    return (
-        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
-                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST,
-                  0.0 if prefix else None, scale=0.1),
-        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
-                    -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
-        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
-                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
-          for axes in (*MOMENTS, *PRODUCTS)))
+                    moved: float = inf) -> tuple[Parameter, ...]:
+    """Return the parameters of a body on a link of some mass; `prefix` is before their names.
 
-
-def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, ...]:
-    """Return what efforts are linear in: the first moment instead of the centre.
-
+    Efforts are linear in the first moment about the link's centre, not in the body's place.
     `moved` is the mass of all that the mechanism moves, as which a body is usually no heavier:
     on a link that turns about a fixed axis a recording decides the first moment, not the mass.
     """
-    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
-    moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
-                         f'mass times its place along {axis} of {link}',
-                         -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
-    return (replace(mass, expected=(moved, moved) if 0 < moved < inf else None), *moments,
-            *rest[3:])
+    return (
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
+                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST, 0.0 if prefix else None, scale=0.1,
+                  expected=(moved, moved) if 0 < moved < inf else None),
+        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
+                    -1e2, 1e2, at, scale=0.05, product=Product(
+                        Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+                                  f'mass times its place along {axis} of {link}', -1e3, 1e3, 0.0,
+                                  scale=0.05), f'{prefix}mass', at))
+          for axis, at in zip(AXES, centre, strict=True)),
+        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
+                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
+          for axes in (*MOMENTS, *PRODUCTS)))
 
 
 class AddedBody(BodyEffect):
@@ -134,76 +172,29 @@ class AddedBody(BodyEffect):
     """
 
     places: ClassVar[tuple[BodyPlace, ...]] = ()
-    has_extent = True
+    has_extent: ClassVar[bool]
     idealised = False
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        super().__init__(values)
-        self._linear = self.to_coefficients(self.values)
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.has_extent = not all(place.is_spread for place in cls.places)
 
     @classmethod
-    @cache
-    def on(cls, places: tuple[BodyPlace, ...],
-           alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
-        """Return the effect with these places on a mechanism that moves so much mass.
+    def of_place(cls, place: BodyPlace, is_alike: bool, moved: float) -> OfPlace:
+        """Return the parameters and variants of a body on a link.
 
-        Of links that are alike the first represents all, with a body anywhere; with a mass more
+        Of links that are alike the first represents all, with a body anywhere. With a mass more
         at its own centre each of them is a hypothesis of its own.
         """
-        stand_ins = {name for group in alike for name in group[1:]}
-        linear: list[Parameter] = []
-        coefficients: list[Parameter] = []
-        names: list[tuple[str, ...]] = []
-        for place in places:
-            link, centre, weight, is_spread = place
-            prefix, count = cls.prefix_of(place), 1 if is_spread else None
-            linear += body_parameters(prefix, link, centre, weight)[:count]
-            coefficients += body_coefficients(prefix, link, moved)[:count]
-            mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
-            names += ([(mass,)] if link in stand_ins or is_spread else
-                      [(mass,), (mass, *moment)])
-            if not prefix and not is_spread:
-                inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
-                names += [(mass, *moment, *inertia),
-                          (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
-        return type(cls.__name__, (cls,), {
-            'places': places, 'linear': tuple(linear), 'coefficients': tuple(coefficients),
-            'has_extent': not all(place.is_spread for place in places),
-            'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
-            'made_by': (cls.on, (places, alike, moved))})
-
-    @classmethod
-    def at(cls, coefficients: Mapping[str, float]) -> Self:
-        """Return the effect with these coefficients; those not given are zero."""
-        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
-        effect = cls(cls.from_coefficients(every))
-        effect._linear = every  # a moment without a mass has no centre
-        return effect
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the coefficients that belong to parameters."""
-        if not cls.places:
-            return super().to_coefficients(values)
-        found = cls._shared(values)
-        for prefix, centre in cls._bodies():
-            for axis, at in zip(AXES, centre, strict=True):
-                away = values.get(f'{prefix}{axis}', at) - at
-                found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
-        return found
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return the linear parameters that belong to coefficients."""
-        if not cls.places:
-            return super().from_coefficients(coefficients)
-        found = cls._shared(coefficients)
-        for prefix, centre in cls._bodies():
-            mass = found[f'{prefix}mass']
-            for axis, at in zip(AXES, centre, strict=True):
-                moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
-                found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
-        return found
+        link, centre, weight, is_spread = place
+        prefix, count = cls.prefix_of(place), 1 if is_spread else None
+        mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
+        variants: list[tuple[str, ...]] = [(mass,)]
+        if not (is_alike or is_spread):
+            variants.append((mass, *moment))
+        if not (prefix or is_spread):
+            variants += [(mass, *moment, *MOMENTS), (mass, *moment, *MOMENTS, *PRODUCTS)]
+        return body_parameters(prefix, link, centre, weight, moved)[:count], variants
 
     @classmethod
     def moments_about_links(cls) -> dict[str, dict[str, float]]:
@@ -214,13 +205,6 @@ class AddedBody(BodyEffect):
         return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
                 for prefix, centre in cls._bodies()
                 for axis, at in zip(AXES, centre, strict=True)}
-
-    @classmethod
-    def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return masses and inertias, which are parameters and coefficients alike."""
-        return {name: values.get(name, 0.0) for place in cls.places
-                for name in (f'{cls.prefix_of(place)}{last}' for last in (
-                    ('mass',) if place.is_spread else ('mass', *MOMENTS, *PRODUCTS)))}
 
     @classmethod
     def prefix_of(cls, place: BodyPlace) -> str:
@@ -300,9 +284,9 @@ class AddedBody(BodyEffect):
         for place in self.places:
             prefix, link = self.prefix_of(place), place.link
             if place.is_spread:
-                robot = robot.heavier(link, self._linear[f'{prefix}mass'])
+                robot = robot.heavier(link, self.exact[f'{prefix}mass'])
                 continue
-            c = [self._linear[f'{prefix}{name}'] for name in (
+            c = [self.exact[f'{prefix}{name}'] for name in (
                 'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
             if not any(c):
                 continue

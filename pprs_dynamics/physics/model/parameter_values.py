@@ -10,16 +10,19 @@ from contextlib import contextmanager
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect, find_parameter
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    ANY,
     NAMED,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
     Key,
+    below,
+    blocks_below,
     is_described,
     keys_of,
     title_of,
@@ -34,9 +37,8 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 
     A parameter for which the file has none is taken as exact.
     """
-    prefix = f'{UNCERTAINTIES}.{effect}.'
-    return {key.removeprefix(prefix): float(std) for key, std in values.items()
-            if key.startswith(prefix)}
+    return {key: float(std)
+            for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
@@ -56,44 +58,40 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
 
 
 # Keys of the block `effects` that are no effect.
-LISTS = ('effects.active', 'effects.measured')
+ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
+LISTS = (ACTIVE.name, 'effects.measured')
 
 
 def added_effects(
     parameters: Mapping[str, Any], robot: Any,
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active on a robot, all blocks checked."""
-    active = parameters.get('effects.active', [])
-    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
-        raise ModelError('effects.active', active, 'be a list of names of effects')
+    active = ACTIVE.check(parameters.get(ACTIVE.name, []))
     if len(set(active)) < len(active):
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
         if find_effect(name) is None:
             raise _unknown(name, 'effects.active')
-    blocks: dict[str, dict[str, Any]] = {}
-    for key, value in parameters.items():
-        block, _, rest = key.partition('.')
-        if block == 'effects' and key not in LISTS:
-            name, _, rest = rest.partition('.')
-            if rest:
-                blocks.setdefault(name, {})[rest] = value
-            elif value in (None, {}):
-                blocks.setdefault(name, {})
-            else:
-                raise ModelError(key, value, 'be a mapping of its parameters')
     of_sensors = _effects_of_sensors(parameters)
+    blocks = blocks_below({key: value for key, value in parameters.items() if key not in LISTS},
+                          'effects.')
     for name, values in blocks.items():
+        if values.pop('', None) not in (None, {}):
+            raise ModelError(f'effects.{name}', parameters[f'effects.{name}'],
+                             'be a mapping of its parameters')
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
         _check_place(name, values, found, robot, title_of(parameters))
         # A block that is not active is checked all the same, but may still be incomplete.
-        effect = found.bound(robot).from_file(values, name in active, robot.turning)
-        if name in active:
-            if name in of_sensors:
-                effect.is_measurement = True
-            yield effect
+        bound = found.bound(robot)
+        if name not in active:
+            bound.checked(values, is_complete=False, turning=robot.turning)
+            continue
+        effect = bound.from_file(values, robot.turning)
+        if name in of_sensors:
+            effect.is_measurement = True
+        yield effect
     missing = [name for name in active if name not in blocks]
     if missing:
         raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
@@ -133,19 +131,12 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         target = name.removeprefix('tolerances.')
         if target == name:
             continue
-        if (target not in keys or not keys[target].is_number) and _expected(target) is None:
+        parameter = find_parameter(target)
+        if not (keys[target].is_number if target in keys else parameter and parameter.expected):
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
-
-
-def _expected(target: str) -> tuple[float, float] | None:
-    """Return how large `effect.parameter` usually is, None for what has no usual size."""
-    name, _, last = target.partition('.')
-    effect = find_effect(name) if last else None
-    return next((p.expected for p in effect.parameters if p.name == last),
-                None) if effect is not None and hasattr(effect, 'parameters') else None
 
 
 @contextmanager
