@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pprs_dynamics import __version__
 from pprs_dynamics.app.report.page import Page
@@ -73,6 +73,8 @@ class Result(ABC):
     Printed, it is what the command prints; in a notebook it shows the same.
     """
 
+    rows: ClassVar[str]
+
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Return what the command writes with --json."""
@@ -97,9 +99,9 @@ class Result(ABC):
             Where plotly is not installed.
         """
 
-    @abstractmethod
     def table(self) -> DataFrame:
-        """Return the numbers as a table of pandas."""
+        """Return the numbers as a table of pandas: the entry `rows` of the dictionary."""
+        return data_frame(self.to_dict()[self.rows])
 
     @abstractmethod
     def plot(self) -> Figure:
@@ -136,9 +138,9 @@ class Result(ABC):
         return as_html(self.view(), WIDTH)
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]], index: Sequence[str] | None = None,
-               name: str | None = None) -> DataFrame:
-    """Return rows as a table of pandas."""
+def data_frame(rows: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> DataFrame:
+    """Return rows as a table of pandas, by their names where they have any."""
     import pandas as pd
 
-    return pd.DataFrame(list(rows), index=None if index is None else pd.Index(index, name=name))
+    return (pd.DataFrame.from_dict(dict(rows), orient='index') if isinstance(rows, Mapping)
+            else pd.DataFrame(list(rows)))

@@ -9,8 +9,6 @@ again therefore skips what is done.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -31,11 +29,6 @@ COLUMNS = {
     'effect': TEXT, 'parameter': TEXT, 'value': NUMBER, 'std': NUMBER, 'unit': TEXT,
     'evidence': NUMBER, 'rms': NUMBER, 'relative': NUMBER, 'noise': NUMBER, 'verdict': TEXT,
     'error': TEXT}
-
-
-def key_of(*parts: str) -> str:
-    """Return the name of a recording's file in a store, without its ending."""
-    return hashlib.sha256(json.dumps(parts).encode(errors='surrogateescape')).hexdigest()[:40]
 
 
 def write_rows(store: Path, key: str, rows: Sequence[Mapping[str, Any]]) -> None:

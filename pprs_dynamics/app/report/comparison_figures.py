@@ -200,14 +200,13 @@ def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
     return residuals.time[np.where(is_break, np.roll(at, 1), at)], *curves
 
 
-def shown_samples(residuals: Residuals, *values: Array, points: int = charts.POINTS,
-                  ) -> np.typing.NDArray[np.int_]:
+def shown_samples(residuals: Residuals, *values: Array) -> np.typing.NDArray[np.int_]:
     """Return the samples that are drawn of curves, as `thinned`; -1 after each segment."""
     segments = np.unique(residuals.segment)
     parts: list[np.typing.NDArray[np.int_]] = []
     for segment in segments:
         inside = np.flatnonzero(residuals.segment == segment)
         at = charts.extremes(*(value[inside] for value in values),
-                             points=max(50, points // len(segments)))
+                             points=max(50, charts.POINTS // len(segments)))
         parts += [inside[at], np.array([-1])]
     return np.concatenate(parts)
