@@ -26,31 +26,7 @@ if TYPE_CHECKING:
 
 
 if TYPE_CHECKING:
-    from pprs_dynamics.physics.model.drive_model import DriveModel
-
-
-def record_of(model: DriveModel | None, recordings: Mapping[str, Recording],
-              held_out: Mapping[str, Recording], command: str = '') -> list[tuple[str, str]]:
-    """Return labelled lines.
-
-    Parameters
-    ----------
-    model : DriveModel or None
-    recordings, held_out : mapping of str to Recording
-        By path, or by a name that is none.
-    command : str
-        As it was given; '' for none.
-    """
-    found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
-             ('version', f'pprs_dynamics {__version__}')]
-    if command:
-        found.append(('command', command))
-    if model is not None:
-        name = Path(model.source).name if model.source else 'built in memory'
-        found.append(('model', f'{name}, sha256 of its values {model.fingerprint}'))
-    for label, of in (('recording', recordings), ('held out', held_out)):
-        found += [(label, text) for text in _described(of)]
-    return found
+    pass
 
 
 def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
@@ -121,9 +97,14 @@ class Result(ABC):
 
     def record(self, command: str = '') -> list[tuple[str, str]]:
         """Return what a result is of: date, version, command, model and recordings with hashes."""
-        inputs = getattr(self, 'inputs', None)
-        return (record_of(None, {}, {}, command) if inputs is None else
-                record_of(inputs.model, inputs.recordings, inputs.validation, command))
+        found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
+                 ('version', f'pprs_dynamics {__version__}'), ('command', command)]
+        if (inputs := getattr(self, 'inputs', None)) is not None:
+            name = Path(inputs.model.source).name or 'built in memory'
+            found.append(('model', f'{name}, sha256 of its values {inputs.model.fingerprint}'))
+            found += [('recording', text) for text in _described(inputs.recordings)]
+            found += [('held out', text) for text in _described(inputs.validation)]
+        return [(label, text) for label, text in found if text]
 
     def __str__(self) -> str:
         return as_text(self.view(), WIDTH)

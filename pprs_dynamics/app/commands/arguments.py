@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.files import writable_file
@@ -32,6 +32,9 @@ NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
 DEFAULT_MODEL = 'config/paper.yaml'
 
 
+Number = TypeVar('Number', int, float)
+
+
 class UsageError(PprsError, ValueError):
     """Arguments that do not go together, or that what was read does not have."""
 
@@ -41,29 +44,23 @@ def number(lower: float, upper: float, unit: str = '', above: bool = False,
     """Return a reader of numbers from `lower`, or above it, to `upper`."""
     rule = (f'must be greater than {lower:g} and at most {upper:g}' if above
             else f'must lie between {lower:g} and {upper:g}') + f' {unit}' * bool(unit)
-
-    def read(text: str) -> float:
-        try:
-            value = parse_number(text)
-        except ValueError:
-            value = math.nan
-        if not lower <= value <= upper or (above and value == lower):
-            raise argparse.ArgumentTypeError(f'{text[:MOST_SHOWN]!r} {rule}')
-        return value
-    return read
+    return _reader(parse_number, lambda value: lower <= value <= upper and (
+        not above or value > lower), rule)
 
 
 def whole(lower: int, upper: int) -> Callable[[str], int]:
     """Return a reader of whole numbers from `lower` to `upper`."""
-    def read(text: str) -> int:
-        try:
-            value = parse_whole(text)
-        except ValueError:
-            value = -1
-        if not lower <= value <= upper:
-            raise argparse.ArgumentTypeError(
-                f'{text[:MOST_SHOWN]!r} must be a whole number from {lower} to {upper}')
-        return value
+    return _reader(parse_whole, lambda value: lower <= value <= upper,
+                   f'must be a whole number from {lower} to {upper}')
+
+
+def _reader(parse: Callable[[str], Number], fits: Callable[[Number], bool], rule: str,
+            ) -> Callable[[str], Number]:
+    def read(text: str) -> Number:
+        with suppress(ValueError):
+            if fits(value := parse(text)):
+                return value
+        raise argparse.ArgumentTypeError(f'{text[:MOST_SHOWN]!r} {rule}')
     return read
 
 
