@@ -16,7 +16,7 @@ import numpy as np
 from pprs_dynamics.app.api.diagnose import DiagnosisResult
 from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result
-from pprs_dynamics.app.report.diagnosis_figures import (
+from pprs_dynamics.app.report.figures import (
     add_contributions,
     add_every_drive,
     before_and_after,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report import comparison_figures as figures
+from pprs_dynamics.app.report import figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table

@@ -12,8 +12,7 @@ from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
 from pprs_dynamics.app.api.simulate import recording_page
-from pprs_dynamics.app.commands.arguments import UsageError, add_shared
-from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
 from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
 from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
 from pprs_dynamics.inference.readings.findings import (

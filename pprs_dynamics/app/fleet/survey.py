@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.fleet.recordings import SurveyedRecording
-from pprs_dynamics.app.fleet.store import AUTO, MODEL
+from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, SurveyedRecording
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from pprs_dynamics.app.report import diagnosis_figures as figures
+from pprs_dynamics.app.report import figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import (
     PlainTable,

@@ -27,7 +27,6 @@ from starlette.routing import Route
 
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.masks import (
     drawn_samples,
     quantities,
@@ -41,6 +40,7 @@ from pprs_dynamics.app.workbench.masks import (
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError

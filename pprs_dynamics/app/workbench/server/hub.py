@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.fleet.recordings import ENDINGS
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.ticks import SessionError
 from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
