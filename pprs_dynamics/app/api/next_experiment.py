@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.api.inputs import (
-    Inputs,
-    Model,
-    Progress,
-    Recordings,
-    stage,
-)
+from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
