@@ -330,7 +330,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
               diagnosis: DiagnosisResult | None = None,
               topic: str | None = None, progress: Progress | None = None,
               reference: Given | None = None) -> AdoptionRunResult:
-    """Diagnose and adopt until no effect is missing.
+    """Diagnose once, and adopt the reported effects.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--details', action='store_true',
                         help='print all findings, tables and values')
     parser.add_argument('--adopt-all', action='store_true',
-                        help='adopt the reported effects until nothing is missing')
+                        help='add the reported effects')
     arguments.add_shared(parser, 'output', required=False,
                          output='model file that --adopt-all writes')
 
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: Any) -> int:
-    """Adopt step by step, write the model file, and return the exit status.
+    """Adopt the reported effects, write the model file, and return the exit status.
 
     With nothing to adopt the file is written as it was; with a refusal, what was adopted before
     it, if anything.

@@ -82,8 +82,7 @@ class FittedSets:
         """
         found = FittedSets(self.design.around(point, alone), self.decisions,
                            self.regression.error_scale)
-        found.components.local = {d: self.components.local[d].around(found.regression)
-                                  for d in found.regression.drives}
+        found.components.propose_as(self.components)
         return found
 
     @property
