@@ -100,6 +100,14 @@ def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
     np.testing.assert_array_equal(copy.time, recording.time)
 
 
+def test_a_bag_is_written_of_arrays_in_any_order(tmp_path: Path) -> None:
+    arrays = measured(60)
+    recording = Recording.from_arrays(
+        'x', *(np.asfortranarray(arrays[name]) for name in ('time', *QUANTITIES)), DRIVES)
+    write_recording(tmp_path / 'x.mcap', recording)
+    assert_same(read_recording(tmp_path / 'x.mcap'), arrays)
+
+
 @settings(max_examples=40,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60),
