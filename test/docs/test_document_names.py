@@ -203,7 +203,7 @@ def test_codes_of_the_status_are_those_of_its_schema_and_of_the_page() -> None:
 
 def test_tests_that_protect_against_a_risk_are_there() -> None:
     text = (PROJECT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
-    named = re.findall(r'`(test/[\w/]+\.py)(?:::(\w+))?`', text)
+    named = re.findall(r'`(test/[\w/]*test_\w+\.py)(?:::(\w+))?`', text)
     assert len(named) > 50
     for file, name in named:
         assert f'def {name or "test_"}' in (PROJECT / file).read_text(encoding='utf-8'), name

@@ -239,7 +239,7 @@ def test_no_time_from_start_switches_the_watchdog_off() -> None:
         endless.points[-1].time_from_start.sec = 2_000_000_000
         node.send(endless)
         assert 'max_duration allows 5 s' in node.wait_for_status(code='TIME')['message']
-        node.wait_for_status(code='STALE')
+        assert node.bench.spin_until(lambda: node.counters['stale'] == 1)
         refused, = node.node.set_parameters([Parameter('max_duration', value=0.0)])
         assert not refused.successful  # it cannot be switched off either
 
