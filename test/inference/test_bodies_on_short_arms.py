@@ -15,7 +15,7 @@ from model_recordings import with_effects
 from planar_arm import planar_arm
 
 from pprs_dynamics import JointMotion
-from pprs_dynamics.app.report.adoption_report import parameter_rows
+from pprs_dynamics.app.api.adopt import parameter_rows
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose

@@ -17,7 +17,8 @@ from made_up_diagnosis import (
 )
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.report.adoption_report import adoption_page
+from pprs_dynamics.app.api.adopt import AdoptionResult
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES
@@ -45,10 +46,9 @@ def _adoption(before: Residuals) -> Page:
     model, after = DriveModel.load(), made_up_residuals()
     friction = found_effect('coulomb_friction').force
     with_it = replace(after, parts={'coulomb_friction': friction})
-    return adoption_page(Adoption(
+    return AdoptionResult(Inputs(model, {}, {}), Adoption(
         EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), model, model, before, with_it,
         0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE),
         {'lift_2.force': Estimate(0.6, 0.01, 'N')},
         remarks=('the recordings call for time_delay, too',), calibrated=(calibration(),),
-        rivals=('load_friction',), reason='the error on held-out data falls'),
-        [], [], 'pprs diagnose run.mcap --model better.yaml')
+        rivals=('load_friction',), reason='the error on held-out data falls')).page()

@@ -31,9 +31,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import for_json
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
-WHERE = {RECORDINGS: 'recordings predicted from the others',
-         HALVES: 'its halves, each predicted from the other,',
-         VALIDATION: 'the validation recordings'}
 PART_OF_IT = ('what was wrong with the robot in these runs is part of the model now: fit healthy '
               'runs without load, and diagnose others')
 
@@ -80,14 +77,6 @@ class BaseFit:
         """Held-out error over that of the input model; drives of different sizes count alike."""
         return root_mean_square([after / max(self.held_out_before[drive], 1e-300)
                                  for drive, after in self.held_out.items()])
-
-    @property
-    def change(self) -> str:
-        """The change of the held-out error as a sentence, and whether the fit is taken."""
-        text = (f'the error on {WHERE[self.held_out_on]} is {self.ratio:.3g} of that before, over '
-                'all drives')
-        return f'{text}: base model fitted again' if self.ratio < 1 else (
-            f'{text}, must fall: the base model stays as it was')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fit for JSON."""

@@ -158,6 +158,11 @@ class Effect(ABC):
             What `initial_memory` returned, advanced in place to the last sample.
         """
 
+    def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
+        """Return the measured effort where the drives apply `effort`, (N, D), if it is a sensor's.
+        """
+        return effort + self.force(state, memory)
+
     def initial_memory(self, start: float | None = None) -> Any:
         """Return a fresh memory, or None for an effect without one.
 
@@ -401,7 +406,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @classmethod
     @abstractmethod
     def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
-                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
         """Return the argument of the class from keys of a model file, or raise ModelError.
 
         Parameters
@@ -411,12 +416,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         is_complete : bool
             False where values may be missing: a node gets them one by one before the effect is
             active.
-        turning : collection of str, optional
-            Drives that turn; None allows the bounds of either kind.
+        turning : collection of str
+            Drives that turn.
         """
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], turning: Collection[str] | None = None) -> Self:
+    def from_file(cls, values: Mapping[str, Any], turning: Collection[str] = ()) -> Self:
         """Return the effect with values of a model file; see `checked`."""
         build: Any = cls
         effect: Self = build(cls.checked(values, turning=turning))
@@ -456,7 +461,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
-                 turns: bool | None = None) -> dict[str, Any]:
+                 turns: bool = False) -> dict[str, Any]:
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
@@ -470,8 +475,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             value = values.get(name, parameter.default)
-            bounded = parameter.widest if turns is None else parameter.of(turns)
-            checked[name] = bounded.check(f'{prefix}.{name}', value)
+            checked[name] = parameter.of(turns).check(f'{prefix}.{name}', value)
         return checked
 
 

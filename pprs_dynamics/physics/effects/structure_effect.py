@@ -76,7 +76,7 @@ class StructureEffect(CatalogueEffect):
 
     @classmethod
     def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
-                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
         """Return the checked values by name of the parameter."""
         return cls._checked(f'effects.{cls.name}', values, is_complete)
 

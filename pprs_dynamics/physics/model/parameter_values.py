@@ -20,6 +20,8 @@ from pprs_dynamics.physics.model.keys import (
     NODE_KEYS,
     NODE_PREFIXES,
     Key,
+    below,
+    blocks_below,
     is_described,
     keys_of,
     title_of,
@@ -34,9 +36,8 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 
     A parameter for which the file has none is taken as exact.
     """
-    prefix = f'{UNCERTAINTIES}.{effect}.'
-    return {key.removeprefix(prefix): float(std) for key, std in values.items()
-            if key.startswith(prefix)}
+    return {key: float(std)
+            for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
@@ -71,19 +72,13 @@ def added_effects(
     for name in active:
         if find_effect(name) is None:
             raise _unknown(name, 'effects.active')
-    blocks: dict[str, dict[str, Any]] = {}
-    for key, value in parameters.items():
-        block, _, rest = key.partition('.')
-        if block == 'effects' and key not in LISTS:
-            name, _, rest = rest.partition('.')
-            if rest:
-                blocks.setdefault(name, {})[rest] = value
-            elif value in (None, {}):
-                blocks.setdefault(name, {})
-            else:
-                raise ModelError(key, value, 'be a mapping of its parameters')
     of_sensors = _effects_of_sensors(parameters)
+    blocks = blocks_below({key: value for key, value in parameters.items() if key not in LISTS},
+                          'effects.')
     for name, values in blocks.items():
+        if values.pop('', None) not in (None, {}):
+            raise ModelError(f'effects.{name}', parameters[f'effects.{name}'],
+                             'be a mapping of its parameters')
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
