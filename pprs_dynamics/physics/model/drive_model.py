@@ -43,7 +43,6 @@ from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
     FILES,
     GAIN,
-    ROBOT,
     Key,
     is_described,
     keys_of,
@@ -167,11 +166,6 @@ class DriveModel:
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
         return keys_of(self.values)
-
-    @property
-    def block(self) -> str:
-        """Block of its file that describes the robot; '' for that of the paper."""
-        return ROBOT if is_described(self.values) else ''
 
     @property
     def is_mechanism(self) -> bool:

@@ -10,11 +10,12 @@ from contextlib import contextmanager
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect, find_parameter
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    ANY,
     NAMED,
     NAMES,
     NODE_KEYS,
@@ -57,16 +58,15 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
 
 
 # Keys of the block `effects` that are no effect.
-LISTS = ('effects.active', 'effects.measured')
+ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
+LISTS = (ACTIVE.name, 'effects.measured')
 
 
 def added_effects(
     parameters: Mapping[str, Any], robot: Any,
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active on a robot, all blocks checked."""
-    active = parameters.get('effects.active', [])
-    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
-        raise ModelError('effects.active', active, 'be a list of names of effects')
+    active = ACTIVE.check(parameters.get(ACTIVE.name, []))
     if len(set(active)) < len(active):
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
@@ -131,19 +131,12 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         target = name.removeprefix('tolerances.')
         if target == name:
             continue
-        if (target not in keys or not keys[target].is_number) and _expected(target) is None:
+        parameter = find_parameter(target)
+        if not (keys[target].is_number if target in keys else parameter and parameter.expected):
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
-
-
-def _expected(target: str) -> tuple[float, float] | None:
-    """Return how large `effect.parameter` usually is, None for what has no usual size."""
-    name, _, last = target.partition('.')
-    effect = find_effect(name) if last else None
-    return next((p.expected for p in effect.parameters if p.name == last),
-                None) if effect is not None and hasattr(effect, 'parameters') else None
 
 
 @contextmanager

@@ -74,16 +74,11 @@ def read_platform(values: Mapping[str, Any],
         values['equations'] == 'printed')
     drives = DriveFriction(values['friction.drives.viscous'], 0.0,
                            values['friction.drives.coulomb'])
+    lower, upper = np.array([values[key] for key in STROKES]).T
     return (robot, (drives, passive),
             Reversal(_reversal_widths(values), values['friction.reversal_rate']),
-            platform_limits(values))
-
-
-def platform_limits(values: Mapping[str, Any]) -> DriveLimits:
-    """Return the strokes and efforts in the values of a 3-PPRS."""
-    lower, upper = np.array([values[key] for key in STROKES]).T
-    return DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
-                       np.array(values['limits.effort']), STROKES, 'limits.effort')
+            DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
+                        np.array(values['limits.effort']), STROKES, 'limits.effort'))
 
 
 def _reversal_widths(values: Mapping[str, Any]) -> tuple[float, ...]:
@@ -110,19 +105,14 @@ def read_mechanism(values: dict[str, Any], folder: Path,
     structure = read_structure(values, folder)
     values.update(described_values(structure, values))
     robot = _with_bodies(structure, values)
+    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
     return (robot, (DriveFriction(values['friction.viscous'], values['friction.coulomb']),
                     DriveOffset(values['friction.offset']), *passive_friction(structure, values)),
             Reversal(_reversal_widths(values), values['friction.reversal_rate'],
                      values['friction.reversal_slide']),
-            joint_limits(structure))
-
-
-def joint_limits(structure: Structure) -> DriveLimits:
-    """Return the ranges and efforts that a description has; infinite where it has none."""
-    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
-    return DriveLimits(
-        structure.drives, units, structure.lower, structure.upper, structure.effort,
-        ('its range in the URDF',) * len(units), 'the effort limit of URDF or node')
+            DriveLimits(structure.drives, units, structure.lower, structure.upper,
+                        structure.effort, ('its range in the URDF',) * len(units),
+                        'the effort limit of URDF or node'))
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:

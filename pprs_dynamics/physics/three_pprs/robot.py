@@ -210,9 +210,7 @@ def condition_number(geometry: Geometry, J: Array) -> Array:
     J. Angeles, Fundamentals of Robotic Mechanical Systems, on the characteristic length.
     """
     r = geometry.platform_radius
-    singular = np.linalg.svd(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None], compute_uv=False)
-    with np.errstate(divide='ignore'):
-        number: Array = singular[:, 0] / singular[:, -1]
+    number: Array = np.linalg.cond(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None])
     return number
 
 
