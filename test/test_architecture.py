@@ -148,24 +148,3 @@ def test_the_package_description_names_what_the_nodes_import() -> None:
     assert {'rclpy', 'sensor_msgs', 'numpy'} <= others
     named = {each.text for each in DESCRIPTION.findall('exec_depend')}
     assert {name for name in others if not {name, f'python3-{name}'} & named} == set()
-
-
-# The linters of ament on the package, with the project's line length and NumPy docstrings.
-
-SOURCES = str(Path(__file__).parents[1] / 'pprs_dynamics')
-# Left to the judgement of people: docstrings of what is named for itself, and of properties, which
-# say what they are and not what to do.
-OF_TASTE = ['D102', 'D105', 'D401']
-
-
-@pytest.mark.slow
-def test_flake8(capsys: pytest.CaptureFixture[str]) -> None:
-    linter = pytest.importorskip('ament_flake8.main')
-    assert linter.main(['--linelength', '100', SOURCES]) == 0, capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_pep257(capsys: pytest.CaptureFixture[str]) -> None:
-    linter = pytest.importorskip('ament_pep257.main')
-    found = linter.main(['--convention', 'numpy', '--add-ignore', *OF_TASTE, '--', SOURCES])
-    assert found == 0, capsys.readouterr().err
