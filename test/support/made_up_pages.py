@@ -18,8 +18,8 @@ from made_up_diagnosis import (
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.api.adopt import AdoptionResult
+from pprs_dynamics.app.api.diagnose import diagnosis_page
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
