@@ -76,7 +76,9 @@ class DiagnosisResult(Result):
         """Return the page of `pprs diagnose --report`."""
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
-            self.diagnosis, self._words, after, *self.inputs.names, self._rivals)
+            self.diagnosis, self._words, after,
+            [recording.name for recording in self.inputs.fitted],
+            [recording.name for recording in self.inputs.held_out], self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""

@@ -6,63 +6,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics import __version__
 from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.record import record_of
 from pprs_dynamics.app.report.terminal import as_html, as_text
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
-from pprs_dynamics.measurement.files.recording import Recording, describe
+from pprs_dynamics.errors import MissingLibraryError
 
 if TYPE_CHECKING:
     # What results return, named for all of them.
     from matplotlib.figure import Figure as Figure
     from pandas import DataFrame as DataFrame
-
-
-if TYPE_CHECKING:
-    from pprs_dynamics.physics.model.drive_model import DriveModel
-
-
-def record_of(model: DriveModel | None, recordings: Mapping[str, Recording],
-              held_out: Mapping[str, Recording], command: str = '') -> list[tuple[str, str]]:
-    """Return labelled lines.
-
-    Parameters
-    ----------
-    model : DriveModel or None
-    recordings, held_out : mapping of str to Recording
-        By path, or by a name that is none.
-    command : str
-        As it was given; '' for none.
-    """
-    found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
-             ('version', f'pprs_dynamics {__version__}')]
-    if command:
-        found.append(('command', command))
-    if model is not None:
-        name = Path(model.source).name if model.source else 'built in memory'
-        found.append(('model', f'{name}, sha256 of its values {model.fingerprint}'))
-    for label, of in (('recording', recordings), ('held out', held_out)):
-        found += [(label, text) for text in _described(of)]
-    return found
-
-
-def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
-    for name, recording in recordings.items():
-        summary = describe(recording)
-        try:
-            digest = fingerprint(name) if Path(name).exists() else samples_fingerprint(recording)
-        except UnreadableFileError:
-            digest = samples_fingerprint(recording)
-        yield (f'{recording.name}: {summary.used} samples, {summary.duration:.2f} s at '
-               f'{summary.rate:.6g} Hz, sha256 {digest}')
-
 
 WIDTH = 100  # characters of a line of text
 
@@ -78,8 +35,8 @@ class Result(ABC):
         """Return what the command writes with --json."""
 
     @abstractmethod
-    def view(self) -> Any:
-        """Return what the terminal shows, for rich's console.
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows, for rich's console; all there is with `details`.
 
         Raises
         ------

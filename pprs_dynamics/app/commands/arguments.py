@@ -24,7 +24,7 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap')
-INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'file', 'manifest',
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
           'store', 'path')
 NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
          'store': 'the store'}
@@ -112,6 +112,7 @@ SHARED: dict[str, dict[str, Any]] = {
     'reference': {'metavar': 'RECORDING', 'nargs': '*', 'help': 'report what has changed since '
                   'these recordings of the healthy machine (none named: those that the model file '
                   'names)'},
+    'details': {'action': 'store_true', 'help': 'print all findings, tables and values'},
     'report': {'metavar': 'FILE.html', 'type': output_file(*PAGE),
                'help': 'write a page with all figures'},
     'output': {'metavar': 'FILE.yaml', 'type': output_file(*MODEL), 'help': 'model file to write'},

@@ -17,7 +17,7 @@ EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'output', 'report')
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'output', 'details', 'report')
 
 
 def run(options: argparse.Namespace) -> int:

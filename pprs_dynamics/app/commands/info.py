@@ -11,11 +11,14 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
-from pprs_dynamics.app.api.simulate import recording_page
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared
 from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
-from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
+from pprs_dynamics.app.report.mechanism_description import (
+    describe_mechanism,
+    mechanism_lines,
+)
+from pprs_dynamics.app.report.tables import reading_table, recording_page
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
     OtherReading,
@@ -25,62 +28,6 @@ from pprs_dynamics.inference.readings.findings import (
 from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_text import counted
-
-
-def describe_mechanism(model: DriveModel) -> dict[str, Any]:
-    """Return bodies, joints, loops, mobility and conditioning, for JSON."""
-    robot = model.robot
-    s = robot.structure
-    home = dict(zip(s.coordinates, s.home.tolist(), strict=True))
-    joints = []
-    for name, row in s.rows.items():
-        joint = s.description.joints[name]
-        joints.append({
-            'name': name, 'kind': joint.kind, 'moves': s.moved_by.get(row, ''),
-            'role': _role(model, name),
-            'home': float(s.tables.ratio[row] * s.home[s.tables.coordinate[row]]
-                          + s.tables.offset[row]),
-            **({'mimics': joint.mimic.joint} if joint.mimic else {})})
-    return {
-        'bodies': [{'link': link, 'mass': float(mass)} for link, mass in zip(
-            robot.body_names, robot.masses, strict=True)],
-        'joints': joints,
-        'loops': [{'name': loop.name, 'type': loop.kind, 'a': loop.a, 'b': loop.b}
-                  for loop in s.loops],
-        'drives': list(s.drives), 'held': list(s.held), 'home': home,
-        'degrees_of_freedom': s.mobility.freedoms, 'independent_rows': len(s.mobility.rows),
-        'condition_number': s.mobility.condition, 'faults': list(s.description.faults),
-        'remarks': list(s.description.remarks)}
-
-
-def mechanism_lines(model: DriveModel) -> list[str]:
-    """Return the same as sentences for the terminal."""
-    found = describe_mechanism(model)
-    s = model.robot.structure
-    held = f': {", ".join(found["held"])} held' if found['held'] else ''
-    lines = [
-        f'{counted(len(found["bodies"]), "body")}, {model.robot.masses.sum():.4g} kg in total, '
-        f'{counted(len(s.rows), "joint")}, {counted(len(s.loops), "loop")}',
-        f'{counted(found["degrees_of_freedom"], "degree of freedom")}, '
-        f'{counted(len(s.drives), "drive")} ({", ".join(s.drives)}){held}']
-    if s.loops:
-        lines.append('loops: ' + ', '.join(f'{entry["name"]} ({entry["type"]}, {entry["a"]} on '
-                                           f'{entry["b"]})' for entry in found['loops']))
-        lines.append(f'{found["independent_rows"]} independent rows close them at home; condition '
-                     f'number {found["condition_number"]:.3g} (lengths in units of '
-                     f'{s.size:.3g} m)')
-    lines.append('home: ' + ', '.join(
-        f'{name} {value:.4g} {"rad" if unit.turns else "m"}' for name, value, unit in zip(
-            s.drives, s.home[s.tables.drives], model.units, strict=True)))
-    return lines
-
-
-def _role(model: DriveModel, name: str) -> str:
-    s = model.robot.structure
-    c = int(s.tables.coordinate[s.rows[name]])
-    return ('driven' if c in s.tables.drives else 'held' if c in s.mobility.held else 'passive')
-
 
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
@@ -143,38 +90,3 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
     return recordings, summaries
-
-
-def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
-    """Return how the columns of a recording are read: column, drive, quantity, unit, range."""
-    rows = []
-    joints = recorded.joints or recorded.names
-    for drive, joint, units in zip(recorded.names, joints, recorded.units, strict=True):
-        found = summary.drives[drive]
-        columns = (DriveColumns() if recorded.columns is None
-                   else recorded.columns.drives.get(drive, DriveColumns()))
-        current = 'current' in columns.names
-        in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
-                         for finding in summary.findings)
-        for quantity, bounds, unit, factor in (
-                ('position', found.position, units.position, columns.position_scale),
-                ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
-                ('current' if current else 'effort', found.effort,
-                 'A' if in_amperes else units.effort, columns.effort_scale),
-                *((name, each, units.of(CHANNELS[name]), 1.0)
-                  for name, each in found.channels.items())):
-            if bounds is not None:
-                column = columns.names.get(quantity, f'{joint}/{quantity}')
-                rows.append((escape(str(column)), escape(drive), quantity, unit + (
-                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds) + (
-                        f' ({found.measured:.1%} measured)'
-                        if quantity in ('current', 'effort') and found.measured < 1 else '')))
-    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows, right=(),
-                      caption=escape(summary.source), title=escape(
-                          f'{summary.name}: {summary.used} of {summary.samples} samples in '
-                          f'{counted(len(summary.segments), "segment")}, '
-                          f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
-
-
-def _span(bounds: tuple[float, float] | None) -> str:
-    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'

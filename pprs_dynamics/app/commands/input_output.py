@@ -78,6 +78,6 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
             made.record(result.record(shlex.join(['pprs', *getattr(options, 'words', ())])))
             made.write(options.report)
     # Last: a reader of the text that goes away, as `head` does, ends the command.
-    screen.print(result.view() if view is None else view)
+    screen.print(result.view(details=getattr(options, 'details', False)) if view is None else view)
     if getattr(options, 'report', None):
         screen.print(f'page: {shown(options.report)}', soft_wrap=True)

@@ -23,14 +23,31 @@ from pprs_dynamics.system.files import new_file
 AUTO = 'auto'  # effects of a survey that diagnoses
 MODEL = 'model'  # stands for the effect in rows of the model's own numbers
 
-TEXT, NUMBER = 'string', 'float64'
-# Types of pandas by name; docs/fleets.md has units and meanings.
-COLUMNS = {
-    'recording': TEXT, 'path': TEXT, 'sha256': TEXT, 'robot': TEXT, 'time': 'datetime64[us, UTC]',
-    'duration': NUMBER, 'model': TEXT, 'options': TEXT, 'version': TEXT, 'drive': TEXT,
-    'effect': TEXT, 'parameter': TEXT, 'value': NUMBER, 'std': NUMBER, 'unit': TEXT,
-    'evidence': NUMBER, 'rms': NUMBER, 'relative': NUMBER, 'noise': NUMBER, 'verdict': TEXT,
-    'error': TEXT}
+# Name, pandas type, unit, meaning; docs/fleets.md prints this table.
+COLUMNS: tuple[tuple[str, str, str, str], ...] = (
+    ('recording', 'string', '', 'name of the file or bag'),
+    ('path', 'string', '', 'where it was read from'),
+    ('sha256', 'string', '', 'of its content'),
+    ('robot', 'string', '', 'of the manifest, else the name of the folder'),
+    ('time', 'datetime64[us, UTC]', 'UTC', "of the manifest, else the recording's first stamp"),
+    ('duration', 'float64', 's', 'of its segments together'),
+    ('model', 'string', '', "SHA-256 of the model's values"),
+    ('options', 'string', '', 'auto, or the effects that were fitted'),
+    ('version', 'string', '', 'of this package'),
+    ('drive', 'string', '', "null for the structure and the model's own numbers"),
+    ('effect', 'string', '', "name in the catalogue; model for the model's own numbers; null in "
+     "a drive's first row"),
+    ('parameter', 'string', '', 'coefficient of the effect, or key of the model file'),
+    ('value', 'float64', 'unit', 'as fitted'),
+    ('std', 'float64', 'unit', 'its standard deviation; null if it is unknown'),
+    ('unit', 'string', '', 'of value and std'),
+    ('evidence', 'float64', '1', 'by which the cost rises without the effect'),
+    ('rms', 'float64', 'N', 'rms of measured minus model, of the drive'),
+    ('relative', 'float64', '1', 'rms over that of the changing part of the effort'),
+    ('noise', 'float64', 'N', "rms of the drive's noise"),
+    ('verdict', 'string', '', 'of diagnose; fitted with named effects; refused without a result'),
+    ('error', 'string', '', 'why there is no result; null if there is one'),
+)
 
 
 def key_of(*parts: str) -> str:
@@ -47,8 +64,9 @@ def write_rows(store: Path, key: str, rows: Sequence[Mapping[str, Any]]) -> None
         If it cannot be written.
     """
     pd = pandas()
-    table = pd.DataFrame(list(rows), columns=[*COLUMNS]).astype(COLUMNS)
-    numbers = table.select_dtypes(NUMBER).columns
+    table = pd.DataFrame(list(rows), columns=[name for name, *_ in COLUMNS]).astype(
+        {name: kind for name, kind, *_ in COLUMNS})
+    numbers = table.select_dtypes('float64').columns
     table[numbers] = table[numbers].where(table[numbers].abs() < float('inf'))
     content = BytesIO()
     table.to_parquet(content, index=False)
@@ -73,7 +91,7 @@ def read_rows(store: str) -> Any:
         except (OSError, ValueError) as error:
             raise UnreadableFileError(file, 'is damaged, delete it and run pprs survey again: '
                                       f'{str(error).splitlines()[0]}') from None
-    if not tables or {*COLUMNS} - {*tables[0].columns}:
+    if not tables or {name for name, *_ in COLUMNS} - {*tables[0].columns}:
         raise UnreadableFileError(store, 'not a store, must be a folder that `pprs survey '
                                   '--output` wrote')
     return pd.concat(tables, ignore_index=True)

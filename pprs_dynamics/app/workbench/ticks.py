@@ -250,9 +250,9 @@ class Ticks:
             view = self.settle()
         if not view.ticks:
             return self.model
-        if view.model is None:
+        if view.exact is None:
             raise SessionError(f'no model has these values: {view.notice}')
-        return view.model
+        return view.exact.model
 
     # Undo
 
@@ -289,6 +289,10 @@ class Ticks:
 
     def _moment(self, deed: str) -> Moment:
         return Moment(deed, self.model, self.view.ticks, self.fitted_since)
+
+    def forget(self) -> None:
+        """Forget what was done until now."""
+        self._done, self._undone = [], []
 
     def back(self, revision: int | None = None) -> ViewState:
         """Undo the last tick, value or adoption.
