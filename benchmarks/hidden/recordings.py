@@ -33,6 +33,8 @@ from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smo
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.engine_loops import ClosedMotion
 from pprs_dynamics.simulation.injected_forms import read_thermometers
 from pprs_dynamics.simulation.injection import (
     CLIMATE,
@@ -137,9 +139,9 @@ class Scene:
 
     def move(self, seed: int) -> None:
         """Let the robot move along the motion of a seed."""
-        self.path, self.platform, motion = _motion(seed, self.duration)
+        self.path, self.platform, motion, closed = _motion(seed, self.duration)
         self.plain = PlainRobot(simulated(
-            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS)
+            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS, closed)
         kept = len(motion) - LEAD
         self.treat = Treatment(np.arange(0, kept, self.block), kept)
         self._refits: dict[str | float, Refit] = {}
@@ -239,11 +241,13 @@ def scene(seed: int, width: float, duration: float = DURATION) -> Scene:
 
 
 @lru_cache(maxsize=2)
-def _motion(seed: int, duration: float) -> tuple[RandomMotion, PlatformMotion, JointMotion]:
+def _motion(seed: int, duration: float,
+            ) -> tuple[RandomMotion, PlatformMotion, JointMotion, ClosedMotion]:
     model = DriveModel.load()
     path = draw_motion(model, seed, duration)
     platform = path.motion(np.arange(-LEAD, round(duration * RATE)) / RATE)
-    return path, platform, driven(model, platform)
+    motion = driven(model, platform)
+    return path, platform, motion, MechanismEngine(as_mechanism(model)).closed(motion)
 
 
 def driven(model: DriveModel, platform: PlatformMotion) -> JointMotion:

@@ -16,13 +16,12 @@ import pytest
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet.recordings import (
-    COLUMNS,
     ManifestError,
     SurveyedRecording,
     find_recordings,
     read_manifest,
-    write_rows,
 )
+from pprs_dynamics.app.fleet.store import COLUMNS, write_rows
 from pprs_dynamics.app.fleet.trend import find_steps, fleet_trends
 from pprs_dynamics.errors import UnreadableFileError
 
@@ -152,7 +151,7 @@ def test_a_survey_writes_documented_columns_and_does_nothing_twice(
     assert '0 done, 4 done before' in ' '.join(capsys.readouterr().out.split())
     rows = pandas.read_parquet(store)
     text = (Path(__file__).parents[2] / 'docs' / 'fleets.md').read_text()
-    assert [*rows.columns] == [*COLUMNS] == re.findall(
+    assert [*rows.columns] == [name for name, *_ in COLUMNS] == re.findall(
         r'^\| `(\w+)` \|', text, re.MULTILINE)
     found = rows[rows.effect == 'coulomb_friction']
     assert len(found) == 3

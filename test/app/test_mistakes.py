@@ -39,6 +39,8 @@ MISTAKES = {
     'compare silent.csv': 'silent.csv: no effort of any drive',
     'diagnose run.csv --adopt-all': '--adopt-all: no --output FILE is given',
     'diagnose run.csv --output x.yaml': '--output: it is given without --adopt-all',
+    'diagnose run.csv --adopt-all --output x.yaml --refit --reference':
+        '--refit: it is given with --reference',
     'diagnose run.csv --model nowhere.yaml': 'nowhere.yaml: no such file',
     'export --output x.txt --model model.yaml': ENDS,
     'fit nowhere.csv --output x.yaml': 'nowhere.csv: No such file',

@@ -87,11 +87,21 @@ def test_the_base_is_fitted_again_beside_an_effect_that_it_held(tmp_path: Path) 
         'friction.coulomb': tuple(1.3 * np.array(arm.FRICTION['friction.coulomb']))})
     runs = [arm.record(real, arm.motion(10.0, seed=seed), NOISE, seed) for seed in (0, 1)]
     again = fit_base(held, runs[:1], runs[1:])
+    assert again.ratio < 1, again.change
     assert again.model.values['friction.coulomb'] == pytest.approx(
         arm.FRICTION['friction.coulomb'], rel=0.05)
     # What was adopted stays as it was.
     for key in load:
         assert again.model.values[key] == held.values[key]
+
+
+def test_a_base_that_predicts_worse_is_not_taken(tmp_path: Path) -> None:
+    real, other = arm.real_arm(tmp_path), heavier(tmp_path)
+    run, validate = (arm.record(one, arm.motion(10.0, seed=seed), NOISE, seed)
+                     for one, seed in ((other, 0), (real, 1)))
+    again = fit_base(real, [run], [validate])
+    assert again.ratio > 1
+    assert 'must fall' in again.change
 
 
 def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from planar_arm import planar_arm
 
 from pprs_dynamics import JointMotion
-from pprs_dynamics.app.api.adopt import parameter_rows
+from pprs_dynamics.app.report.adoption_report import parameter_rows
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose

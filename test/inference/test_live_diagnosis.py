@@ -14,7 +14,7 @@ from single_axis import AXIS, axis, axis_recording
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
+from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis, change_point
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 
@@ -72,3 +72,10 @@ def test_a_robot_that_stands_is_not_diagnosed() -> None:
     live = LiveDiagnosis(model).with_window(standing, 0.0)
     assert live.last is None
     assert 'hardly moves' in live.note
+
+
+def test_the_change_point_is_where_the_cumulated_gain_is_lowest() -> None:
+    time = np.arange(100) / 10.0
+    gains = np.where(time < 4.0, -1.0, 1.0)
+    assert change_point(time, gains) == pytest.approx(4.0)
+    assert change_point(time, np.ones(100)) is None

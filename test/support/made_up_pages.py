@@ -20,14 +20,13 @@ from made_up_diagnosis import (
 )
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.api.adopt import AdoptionResult
-from pprs_dynamics.app.api.compare import ComparisonResult
-from pprs_dynamics.app.api.diagnose import diagnosis_page
-from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.api.next_experiment import ExperimentResult
-from pprs_dynamics.app.commands.trend import fleet_page
-from pprs_dynamics.app.fleet.recordings import write_rows
+from pprs_dynamics.app.fleet.store import write_rows
 from pprs_dynamics.app.fleet.trend import fleet_trends
+from pprs_dynamics.app.report.adoption_report import adoption_page
+from pprs_dynamics.app.report.comparison_report import comparison_page
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
+from pprs_dynamics.app.report.experiment_report import experiment_page
+from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.history_report import history_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES
@@ -58,9 +57,9 @@ def made_up_pages(folder: Path) -> dict[str, Page]:
     words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
     return {
         'diagnosis': diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap']),
-        'comparison': ComparisonResult(
-            Inputs(DriveModel.load(), {}, {}), diagnosis.residuals, compare(diagnosis.residuals),
-            ('so',)).page(),
+        'comparison': comparison_page(
+            DriveModel.load(), [], diagnosis.residuals, compare(diagnosis.residuals), ['so'],
+            ('Find out why', 'pprs diagnose run.mcap')),
         'adoption': _adoption(diagnosis.residuals), 'history': _history(),
         'experiment': _experiment(), 'fleet': _fleet(folder / 'store')}
 
@@ -69,13 +68,13 @@ def _adoption(before: Residuals) -> Page:
     model, after = DriveModel.load(), made_up_residuals()
     friction = found_effect('coulomb_friction').force
     with_it = replace(after, parts={'coulomb_friction': friction})
-    return AdoptionResult(Inputs(model, {}, {}), Adoption(
+    return adoption_page(Adoption(
         EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), model, model, before, with_it,
         0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE),
         {'lift_2.force': Estimate(0.6, 0.01, 'N')},
         remarks=('the recordings call for time_delay, too',), calibrated=(calibration(),),
         rivals=('load_friction',), reason='the error on held-out data falls'),
-        ).page()
+        [], [], 'pprs diagnose run.mcap --model better.yaml')
 
 
 def _history() -> Page:
@@ -98,8 +97,7 @@ def _experiment() -> Page:
         (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),),
         {f'velocity of {name}': 0.1 * k + 0.3 for k, name in enumerate(DRIVES)}, 4.0, path.motion,
         model)
-    return ExperimentResult(Inputs(model, {}, {}), experiment, path.motion(
-        np.arange(0.0, 4.0, 0.01)), 'separate', 0, 100.0).page()
+    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)))
 
 
 def _fleet(folder: Path) -> Page:

@@ -35,7 +35,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import base_numbers, base_prior, reconstructed
+from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior
 from pprs_dynamics.inference.fit.repeating_forces import (
     Integers,
     Process,
@@ -51,7 +51,12 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
-from pprs_dynamics.inference.residuals.reconstruction import CHUNK, Reconstruction
+from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
+from pprs_dynamics.inference.residuals.reconstruction import (
+    CHUNK,
+    Reconstruction,
+    reconstruct,
+)
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -126,7 +131,7 @@ class Reference:
         PprsError
             As `measure_residuals`.
         """
-        found, residuals = reconstructed(model, recordings)
+        found, residuals = _measured(model, recordings)
         names = ', '.join(recording.name for recording in recordings)
         if len(residuals) < LEAST_LENGTH:
             raise ReferenceRunError(
@@ -168,7 +173,7 @@ class Reference:
 
     def shown_by(self, recordings: Sequence[Recording]) -> Array:
         """Return the forces that recordings and it have beyond the model, (M, D) [N]."""
-        found, residuals = reconstructed(self.model, recordings)
+        found, residuals = _measured(self.model, recordings)
         return self._carried_over(residuals, found).shown(residuals)
 
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
@@ -177,7 +182,7 @@ class Reference:
         q, v = motion_of(residuals)
         known = _features(self.processes, q, v, residuals.period)
         shared = self.processes[0][0].new(q, v, known[0][0])
-        numbers = (base_numbers(self.model, reconstructions) @ self.base if self.base.size
+        numbers = (_numbers(self.model, reconstructions) @ self.base if self.base.size
                    else np.zeros((len(q), count, 0)))
         of_base = numbers[..., :determined] @ self.fit.coefficients[:determined]
         together, apart = [], []
@@ -306,7 +311,7 @@ def _base(model: DriveModel, found: Sequence[Reconstruction], residuals: Residua
     """Return columns (M, D, P) of determined directions of the base, and all directions."""
     if not model.is_mechanism:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0))
-    numbers = base_numbers(model, found)
+    numbers = _numbers(model, found)
     prior = base_prior(model, residuals.measured, numbers)
     columns = numbers @ prior
     known = np.isfinite(residuals.error).any(axis=0)
@@ -315,6 +320,18 @@ def _base(model: DriveModel, found: Sequence[Reconstruction], residuals: Residua
         'mdp,mdq,d->pq', columns[:, known], columns[:, known], 1 / noise, optimize=True))
     axes = axes[:, ::-1]
     return columns @ axes[:, :int(np.sum(values > LEAST_INFORMATION))], prior @ axes
+
+
+def _measured(model: DriveModel, recordings: Sequence[Recording],
+              ) -> tuple[list[Reconstruction], Residuals]:
+    found = [reconstruct(model, recording) for recording in recordings]
+    return found, join_tables(model, [treated_table(model, motion) for motion in found])
+
+
+def _numbers(model: DriveModel, found: Sequence[Reconstruction]) -> Array:
+    """Return the columns of a base's numbers on recordings, (M, n, P)."""
+    return np.concatenate([ArmColumns.of_motion(model, motion).numbers(model)
+                           for motion in found])
 
 
 def _features(processes: Processes, q: Array, v: Array, period: float) -> list[list[Array]]:

@@ -52,16 +52,17 @@ class Skeleton:
     lines : tuple of Line
     face : tuple of int
         Corners of the platform, or of whatever carries the load; empty where there are none.
-    joints : dict of str to int
-        Points by the names of joints.
+    joints, loops : dict of str to int
+        Points by the names of joints and of closures.
     labels : dict of str to int
-        Points at which the names of drives are written.
+        Where names stand.
     """
 
     points: Array
     lines: tuple[Line, ...]
     face: tuple[int, ...]
     joints: dict[str, int]
+    loops: dict[str, int]
     labels: dict[str, int]
 
     @classmethod
@@ -106,7 +107,9 @@ def _of_links(links: LinkMotion) -> Skeleton:
         for end in (*on_tool, len(points) - 1):
             join(tool, end, -1, s.tool)
         on_tool = []
-    return Skeleton(np.stack(points, axis=1), tuple(lines), _around(points, on_tool), dict(s.rows),
+    joints = dict(s.rows)
+    return Skeleton(np.stack(points, axis=1), tuple(lines), _around(points, on_tool), joints,
+                    {loop.name: count + k for k, loop in enumerate(s.loops)},
                     {name: s.rows[name] for name in s.drives})
 
 
