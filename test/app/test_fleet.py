@@ -16,12 +16,13 @@ import pytest
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet.recordings import (
+    COLUMNS,
     ManifestError,
     SurveyedRecording,
     find_recordings,
     read_manifest,
+    write_rows,
 )
-from pprs_dynamics.app.fleet.store import COLUMNS, write_rows
 from pprs_dynamics.app.fleet.trend import find_steps, fleet_trends
 from pprs_dynamics.errors import UnreadableFileError
 

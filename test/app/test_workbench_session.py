@@ -19,8 +19,8 @@ from workbench_bench import HIDDEN, write_hidden
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job, run_in_process
+from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.ledger import read_steps

@@ -24,9 +24,9 @@ from made_up_recordings import judged, measured
 from rich.console import Console
 
 from pprs_dynamics.app.api.adopt import AdoptionRunResult
+from pprs_dynamics.app.api.diagnose import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import _parser
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.loop import AdoptionRun

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -73,5 +74,17 @@ def test_another_reading_of_the_description_is_refused(
     model, urdf = DriveModel.load(path), tmp_path / 'robot.urdf'
     assert read in urdf.read_text()
     urdf.write_text(urdf.read_text().replace(read, stands))
+    with pytest.raises(ModelError, match='in MuJoCo'):
+        MechanismEngine(model)
+
+
+def test_a_loop_that_is_open_in_mujoco_is_refused(tmp_path: Path) -> None:
+    model = DriveModel.load(robots.hexapod().write(tmp_path))
+    urdf = Path(model.robot.structure.description.path)
+    tree = ElementTree.parse(urdf)
+    origin = tree.find('joint[@name="leg_1"]/origin')
+    assert origin is not None
+    origin.set('xyz', '0.01 0 0')
+    tree.write(urdf)
     with pytest.raises(ModelError, match='in MuJoCo'):
         MechanismEngine(model)

@@ -22,12 +22,12 @@ from made_up_diagnosis import (
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.api.adopt import AdoptionResult
 from pprs_dynamics.app.api.compare import ComparisonResult
+from pprs_dynamics.app.api.diagnose import diagnosis_page
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.api.next_experiment import ExperimentResult
 from pprs_dynamics.app.commands.trend import fleet_page
-from pprs_dynamics.app.fleet.store import write_rows
+from pprs_dynamics.app.fleet.recordings import write_rows
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.app.report.history_report import history_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES

@@ -15,8 +15,8 @@ import numpy as np
 
 from pprs_dynamics.app.api.diagnose import DiagnosisResult
 from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report.diagnosis_figures import (
+from pprs_dynamics.app.api.result import Result
+from pprs_dynamics.app.report.figures import (
     add_contributions,
     add_every_drive,
     before_and_after,
@@ -49,7 +49,7 @@ from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure
+    from pprs_dynamics.app.api.result import Figure
 
 
 MOST_SHOWN = 6  # values without --details
@@ -87,6 +87,7 @@ class AdoptionResult(Result):
         The answer with all that it was decided from.
     """
 
+    rows = 'parameters'  # what `table` shows
     inputs: Inputs
     adoption: Adoption
 
@@ -205,12 +206,6 @@ class AdoptionResult(Result):
                             for number in answer.calibrated])
         return page
 
-    def table(self) -> DataFrame:
-        """Return a row per parameter: its value, std and unit."""
-        found = self.adoption.parameters
-        return data_frame([{'value': entry.value, 'std': entry.std, 'unit': entry.unit}
-                           for entry in found.values()], list(found), 'parameter')
-
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after, and the noise."""
         return _plot(self.adoption, self.adoption)
@@ -228,6 +223,7 @@ class AdoptionRunResult(Result):
         What was adopted and refused, one after the other.
     """
 
+    rows = 'steps'  # what `table` shows
     inputs: Inputs
     run: AdoptionRun
 
@@ -272,14 +268,6 @@ class AdoptionRunResult(Result):
         """Return the page of `pprs history --report` of the model."""
         return history_page('the adopted model', read_steps(self.model.values),
                             common_effort(self.model.units))
-
-    def table(self) -> DataFrame:
-        """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
-        return data_frame([
-            {'effect': step.effect, 'adopted': step.adopted, 'error_before': step.error_before,
-             'error_after': step.error_after, 'held_out_before': step.held_out_before,
-             'held_out_after': step.held_out_after, 'reason': step.reason}
-            for step in self.run.steps])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before all, after all, and the noise.

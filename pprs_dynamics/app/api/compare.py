@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report import comparison_figures as figures
+from pprs_dynamics.app.report import figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
@@ -198,11 +198,10 @@ class ComparisonResult(Result):
 
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
-        drives = self.comparison.drives
-        return data_frame([{'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias,
-                            'peak': drive.peak, 'noise': drive.noise_floor, 'grade': drive.grade,
-                            'unit': drive.unit} for drive in drives.values()],
-                          list(drives), 'drive')
+        return data_frame({name: {
+            'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias, 'peak': drive.peak,
+            'noise': drive.noise_floor, 'grade': drive.grade, 'unit': drive.unit}
+            for name, drive in self.comparison.drives.items()})
 
     def plot(self) -> Figure:
         """Return a picture: error and noise of every drive, and the worst drive over time."""

@@ -40,18 +40,8 @@ from pprs_dynamics.measurement.files.bag_storage import is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
-from pprs_dynamics.physics.mechanism.branches import (
-    Branch,
-    as_likely,
-    branch_to,
-    root_of,
-)
-from pprs_dynamics.physics.mechanism.description import (
-    FIXED,
-    FLOATING,
-    PRISMATIC,
-    Description,
-)
+from pprs_dynamics.physics.mechanism.branches import Branch, as_likely, branch_to, root_of
+from pprs_dynamics.physics.mechanism.description import FIXED, FLOATING, PRISMATIC, Description
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters

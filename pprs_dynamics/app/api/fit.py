@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.api.result import Result
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
@@ -24,7 +24,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure
+    from pprs_dynamics.app.api.result import Figure
 
 
 HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
@@ -44,6 +44,7 @@ class FitResult(Result):
         The numbers, and the errors before, after and held out.
     """
 
+    rows = 'numbers'  # what `table` shows
     inputs: Inputs
     fit: BaseFit
 
@@ -109,10 +110,6 @@ class FitResult(Result):
         with page.fold('Every number'):
             page.table(*self._numbers)
         return page
-
-    def table(self) -> DataFrame:
-        """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([vars(number) for number in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""

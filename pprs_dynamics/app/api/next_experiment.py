@@ -11,14 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.api.inputs import (
-    Inputs,
-    Model,
-    Progress,
-    Recordings,
-    stage,
-)
-from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.api.result import Result
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_over_time
@@ -32,7 +26,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.simulation.motion_files import write_motion
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure
+    from pprs_dynamics.app.api.result import Figure
 
 
 Motion = PlatformMotion | JointMotion
@@ -82,6 +76,7 @@ class ExperimentResult(Result):
         Of the samples [Hz].
     """
 
+    rows = 'contests'  # what `table` shows
     inputs: Inputs
     design: Experiment
     motion: PlatformMotion | JointMotion
@@ -172,10 +167,6 @@ class ExperimentResult(Result):
                            'model. A parameter is relevant from the size in the fourth column '
                            'on; for numbers of the model this is their tolerance.')
         return page
-
-    def table(self) -> DataFrame:
-        """Return a row per pair of effects: what a diagnosis would say if the first were true."""
-        return data_frame([vars(contest) for contest in self.design.contests])
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""

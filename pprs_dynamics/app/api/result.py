@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pprs_dynamics import __version__
 from pprs_dynamics.app.report.page import Page
@@ -26,31 +26,7 @@ if TYPE_CHECKING:
 
 
 if TYPE_CHECKING:
-    from pprs_dynamics.physics.model.drive_model import DriveModel
-
-
-def record_of(model: DriveModel | None, recordings: Mapping[str, Recording],
-              held_out: Mapping[str, Recording], command: str = '') -> list[tuple[str, str]]:
-    """Return labelled lines.
-
-    Parameters
-    ----------
-    model : DriveModel or None
-    recordings, held_out : mapping of str to Recording
-        By path, or by a name that is none.
-    command : str
-        As it was given; '' for none.
-    """
-    found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
-             ('version', f'pprs_dynamics {__version__}')]
-    if command:
-        found.append(('command', command))
-    if model is not None:
-        name = Path(model.source).name if model.source else 'built in memory'
-        found.append(('model', f'{name}, sha256 of its values {model.fingerprint}'))
-    for label, of in (('recording', recordings), ('held out', held_out)):
-        found += [(label, text) for text in _described(of)]
-    return found
+    pass
 
 
 def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
@@ -72,6 +48,8 @@ class Result(ABC):
 
     Printed, it is what the command prints; in a notebook it shows the same.
     """
+
+    rows: ClassVar[str]
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -97,9 +75,9 @@ class Result(ABC):
             Where plotly is not installed.
         """
 
-    @abstractmethod
     def table(self) -> DataFrame:
-        """Return the numbers as a table of pandas."""
+        """Return the numbers as a table of pandas: the entry `rows` of the dictionary."""
+        return data_frame(self.to_dict()[self.rows])
 
     @abstractmethod
     def plot(self) -> Figure:
@@ -119,9 +97,14 @@ class Result(ABC):
 
     def record(self, command: str = '') -> list[tuple[str, str]]:
         """Return what a result is of: date, version, command, model and recordings with hashes."""
-        inputs = getattr(self, 'inputs', None)
-        return (record_of(None, {}, {}, command) if inputs is None else
-                record_of(inputs.model, inputs.recordings, inputs.validation, command))
+        found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
+                 ('version', f'pprs_dynamics {__version__}'), ('command', command)]
+        if (inputs := getattr(self, 'inputs', None)) is not None:
+            name = Path(inputs.model.source).name or 'built in memory'
+            found.append(('model', f'{name}, sha256 of its values {inputs.model.fingerprint}'))
+            found += [('recording', text) for text in _described(inputs.recordings)]
+            found += [('held out', text) for text in _described(inputs.validation)]
+        return [(label, text) for label, text in found if text]
 
     def __str__(self) -> str:
         return as_text(self.view(), WIDTH)
@@ -136,9 +119,9 @@ class Result(ABC):
         return as_html(self.view(), WIDTH)
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]], index: Sequence[str] | None = None,
-               name: str | None = None) -> DataFrame:
-    """Return rows as a table of pandas."""
+def data_frame(rows: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> DataFrame:
+    """Return rows as a table of pandas, by their names where they have any."""
     import pandas as pd
 
-    return pd.DataFrame(list(rows), index=None if index is None else pd.Index(index, name=name))
+    return (pd.DataFrame.from_dict(dict(rows), orient='index') if isinstance(rows, Mapping)
+            else pd.DataFrame(list(rows)))

@@ -100,12 +100,10 @@ class SimulationResult(Result):
 
     def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
-        drives = describe(self.recording).drives
-        return data_frame([{'lowest_position': drive.position[0],
-                            'highest_position': drive.position[1],
-                            'lowest_effort': (drive.effort or (np.nan, np.nan))[0],
-                            'highest_effort': (drive.effort or (np.nan, np.nan))[1]}
-                           for drive in drives.values()], list(drives), 'drive')
+        return data_frame({name: dict(zip(
+            ('lowest_position', 'highest_position', 'lowest_effort', 'highest_effort'),
+            (*drive.position, *(drive.effort or (np.nan, np.nan))), strict=True))
+            for name, drive in describe(self.recording).drives.items()})
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""

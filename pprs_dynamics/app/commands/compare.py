@@ -9,7 +9,7 @@ import argparse
 
 from pprs_dynamics.app.api.compare import compare
 from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
+from pprs_dynamics.app.commands.arguments import read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'

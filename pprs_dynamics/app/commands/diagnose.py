@@ -11,7 +11,7 @@ from typing import Any
 from pprs_dynamics.app.api.adopt import adopt_all
 from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_json
+from pprs_dynamics.app.commands.arguments import read_inputs, tell, write_json
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.system.plain_text import counted
 

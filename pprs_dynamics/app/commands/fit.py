@@ -8,8 +8,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.fit import fit
-from pprs_dynamics.app.commands.arguments import add_shared
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
+from pprs_dynamics.app.commands.arguments import add_shared, read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'

@@ -13,8 +13,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import output_folder
-from pprs_dynamics.app.commands.input_output import make_folder, write_json
+from pprs_dynamics.app.commands.arguments import make_folder, output_folder, write_json
 from pprs_dynamics.app.report.pictures import draw_figure_8, draw_figure_9
 from pprs_dynamics.app.report.terminal import console, escape, shown, text_table
 from pprs_dynamics.drives import DRIVES

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import add_shared
-from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.commands.arguments import add_shared, write_json
 from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page

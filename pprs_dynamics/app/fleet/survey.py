@@ -8,6 +8,8 @@ Workers run `examine`. A recording that is refused is a row with the reason.
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -18,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.fleet.recordings import SurveyedRecording
-from pprs_dynamics.app.fleet.store import AUTO, MODEL, key_of
+from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, SurveyedRecording
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -80,7 +81,8 @@ class SurveyJob:
 
 def key(common: Mapping[str, Any]) -> str:
     """Return the name of a recording's file in a store."""
-    return key_of(*(common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')))
+    parts = [common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')]
+    return hashlib.sha256(json.dumps(parts).encode(errors='surrogateescape')).hexdigest()[:40]
 
 
 def requests_of(options: str, model: DriveModel) -> tuple[EffectRequest, ...]:

@@ -15,9 +15,8 @@ from threading import Thread
 from typing import Any, Generic, TypeVar
 
 from pprs_dynamics.app.api.next_experiment import ExperimentResult, next_experiment
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import names_of
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.app.report.charts import extremes
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError

@@ -11,10 +11,9 @@ from typing import Any
 
 from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.jobs import Jobs
 from pprs_dynamics.app.workbench.masks import shares_in, span_mask
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError

@@ -25,11 +25,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.fitted_model import (
-    fitted_model,
-    linear_residual,
-    linearised,
-)
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_residual, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording

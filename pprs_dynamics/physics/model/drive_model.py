@@ -38,7 +38,7 @@ from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
-from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
+from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
     FILES,
@@ -249,8 +249,7 @@ class DriveModel:
             self.drives, joint_names(self.values, self.drives),
             recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
             self.units, tuple(self.limits.efforts.tolist()),
-            next((EFFORT_UNITS[value] for key, value in self.values.items()
-                  if key.endswith('.effort_unit')), 1.0))
+            EFFORT_UNITS[self.values.get('robot.effort_unit', 'N m')])
 
     @cached_property
     def fingerprint(self) -> str:
@@ -434,7 +433,8 @@ class DriveModel:
             for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            return Forces(total_force(tuple(parts.values())), parts, mechanism)
+            first, *others = parts.values()
+            return Forces(sum(others, first), parts, mechanism)                    # Eq. (14)
 
     def initial_state(self, start: float | None = None) -> ModelState:
         """Return a fresh state for effects with memory.

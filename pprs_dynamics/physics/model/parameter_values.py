@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -170,21 +170,14 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named: Iterable[str] = NAMED if is_described(parameters) else ()
-    blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
+    in_blocks = (*keys, *ADDED, *(NAMED if is_described(parameters) else ()))
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):
             continue
-        if name not in blocks:
-            raise UnknownNameError('key', name, (*keys, *NODE_KEYS, *sorted(blocks)))
-        if value not in (None, {}):  # a block that somebody left empty says nothing
+        if not any(key.startswith(f'{name}.') for key in in_blocks):
+            raise UnknownNameError('key', name, (*keys, *NODE_KEYS))
+        if value not in (None, {}):  # an empty block says nothing
             raise ModelError(name, value, 'be a mapping, of names to what they hold')
-
-
-def _prefixes(key: str) -> Iterator[str]:
-    """Yield the blocks that a key is in: a and a.b of a.b.c."""
-    parts = key.split('.')
-    yield from ('.'.join(parts[:count]) for count in range(1, len(parts)))
 
 
 def is_known(name: str) -> bool:

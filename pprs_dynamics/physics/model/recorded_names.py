@@ -78,19 +78,16 @@ def effort_kind(values: Mapping[str, Any]) -> str:
 
 
 def gravity_in_efforts(values: Mapping[str, Any], key: str) -> Any:
-    """Return the gravity that the efforts of a model's drives hold [m/s^2].
+    """Return the gravity in the base that the efforts of a model's drives contain [m/s^2].
 
     Parameters
     ----------
     values : mapping
         Of all keys of a model.
     key : str
-        That of gravity: a number, or the vector in the base.
+        That of gravity.
     """
-    gravity = values[key]
-    if effort_kind(values) != WITHOUT_GRAVITY:
-        return gravity
-    return 0.0 if isinstance(gravity, float) else (0.0,) * len(gravity)
+    return (0.0,) * 3 if effort_kind(values) == WITHOUT_GRAVITY else values[key]
 
 
 def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> RecordedColumns | None:

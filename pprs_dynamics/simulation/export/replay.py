@@ -20,7 +20,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
-from pprs_dynamics.simulation.engine_loops import EngineState
+from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot, closures
 from pprs_dynamics.simulation.injection import draw_motion
 
@@ -51,10 +51,11 @@ def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion
                                | mujoco.mjtDisableBit.mjDSBL_LIMIT)
     state = EngineState(mujoco, model, robot.mechanism.structure, Frame())
     data = state.data
-    motion = robot.mechanism.at(drives.position, drives.velocity, drives.acceleration).motion
+    motion = robot.mechanism.at(drives.position, drives.velocity, drives.acceleration)
+    position, velocity, acceleration = state.coordinates(motion)
     found = np.empty_like(drives.position)
     for k in range(len(drives)):
-        state.put(motion, k)
+        data.qpos[:], data.qvel[:], data.qacc[:] = position[k], velocity[k], acceleration[k]
         mujoco.mj_inverse(model, data)
         closing = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         # Dry friction by its law, in the place of the engine's constraints.

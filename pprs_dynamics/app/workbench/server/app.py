@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, nullcontext
 from dataclasses import asdict
 from functools import partial
+from mimetypes import guess_type
 from pathlib import Path
 from sys import float_info
 from tempfile import TemporaryDirectory
@@ -27,7 +28,6 @@ from starlette.routing import Route
 
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.masks import (
     drawn_samples,
     quantities,
@@ -41,6 +41,7 @@ from pprs_dynamics.app.workbench.masks import (
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
@@ -126,18 +127,11 @@ def binary(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Response:
     return Response(packed(header, arrays), media_type='application/octet-stream')
 
 
-def attached(name: str, kind: str, content: bytes) -> Response:
-    """Return a file that the browser saves."""
-    return Response(content, media_type=kind, headers={
-        'Content-Disposition': f'attachment; filename="{name}"'})
-
-
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
 HEARTBEAT = 15.0  # [s] between signs of life
 LOOK = 0.02  # [s] between looks at whether something has changed
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
-TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
 
 # What the session is asked to do by POST, with a JSON object; all are answered by the screen.
 CHANGES: dict[str, Callable[[Session, Fields], object]] = {
@@ -205,11 +199,10 @@ async def page(request: Request) -> Response:
 async def asset(request: Request) -> Response:
     """Answer a file of the page; only those that are shipped are files."""
     name = request.path_params['name']
-    kind = TYPES.get(Path(name).suffix)
-    if kind is None or name not in {*assets(), *VENDORED}:
+    if name not in {*assets(), *VENDORED}:
         raise HTTPException(404)
     content = vendored(VENDORED[name]) if name in VENDORED else packaged(name)
-    return Response(content, media_type=kind)
+    return Response(content, media_type=guess_type(name)[0])
 
 
 class Api:
@@ -313,7 +306,8 @@ class Api:
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
         with TemporaryDirectory(prefix='pprs_workbench_') as folder:
             write(Path(folder) / name)
-            return attached(name, kind, (Path(folder) / name).read_bytes())
+            return Response((Path(folder) / name).read_bytes(), media_type=kind, headers={
+                'Content-Disposition': f'attachment; filename="{name}"'})
 
     def scatter(self, query: Any) -> Response:
         """Answer two quantities of a drive."""

@@ -8,8 +8,10 @@ from __future__ import annotations
 import logging
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory, mkdtemp
@@ -17,19 +19,15 @@ from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING
 
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.fleet.recordings import ENDINGS
-from pprs_dynamics.app.workbench.errors import SessionError
+from pprs_dynamics.app.fleet.recordings import BAG, ENDINGS, recordings_in
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.ticks import SessionError
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.ros.live_joint_states import LiveNodes
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import islice
 
-from pprs_dynamics.app.fleet.recordings import BAG, recordings_in
-from pprs_dynamics.system.plain_text import displayed
 
 MOST_LISTED = 2000
 
@@ -198,13 +196,10 @@ class Hub:
 
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
-        try:
-            with self._opening:  # what a browser opens meanwhile comes on top
-                if self.inputs.recordings:
-                    self._use(Session.of(self.inputs))
-                    self._is_unjudged = True
-        except Exception as error:
-            self._fail(error)
+        with self._opening:  # what a browser opens meanwhile comes on top
+            if self.inputs.recordings and self._done(
+                    lambda: self._use(Session.of(self.inputs))):
+                self._is_unjudged = True
         self.is_beginning = False
         self._changed()
         while not self.is_over:
@@ -215,32 +210,31 @@ class Hub:
             self._work.clear()
             time.sleep(BREATH)
             session = self.session
-            if session is None or self.is_over:
-                continue
-            if not session.ticks.view.is_settled:
-                try:
-                    session.ticks.settle()
-                    self.failure = ''
-                except Exception as error:
-                    self._fail(error)
-                    self._notify()
+            if session is not None and not self.is_over and not session.ticks.view.is_settled and (
+                    self._done(session.ticks.settle)):
+                self.failure = ''
+
+    def _done(self, work: Callable[[], object]) -> bool:
+        """Return whether work succeeds; say on the page what went wrong.
+
+        A defect of ours is logged in the terminal as well.
+        """
+        try:
+            work()
+        except Exception as error:
+            self.failure = str(error)
+            if not isinstance(error, PprsError):
+                self.failure = f'{type(error).__name__}: {error}'
+                logging.getLogger(__name__).exception('the workbench goes on')
+            self._notify()
+            return False
+        return True
 
     def _find_mistakes(self) -> None:
         """Look at units and signs of what the command line gave, once the page stands."""
         if self.session is not None and self._is_unjudged:
-            self._is_unjudged = False
-            try:
-                self.session.ticks.change_recordings(Inputs.checked)
-            except PprsError as error:
-                self.failure = str(error)
-                self._notify()
-
-    def _fail(self, error: Exception) -> None:
-        """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
-        self.failure = str(error)
-        if not isinstance(error, PprsError):
-            self.failure = f'{type(error).__name__}: {error}'
-            logging.getLogger(__name__).exception('the workbench goes on')
+            self._is_unjudged, ticks = False, self.session.ticks
+            self._done(lambda: ticks.change_recordings(Inputs.checked))
 
     def _diagnose(self) -> None:
         session = self.session
