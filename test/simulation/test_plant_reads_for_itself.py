@@ -82,7 +82,7 @@ def test_a_loop_that_is_open_in_mujoco_is_refused(tmp_path: Path) -> None:
     model = DriveModel.load(robots.hexapod().write(tmp_path))
     urdf = Path(model.robot.structure.description.path)
     tree = ElementTree.parse(urdf)
-    origin = tree.find('joint/origin')
+    origin = tree.find('joint[@name="leg_1"]/origin')
     assert origin is not None
     origin.set('xyz', '0.01 0 0')
     tree.write(urdf)

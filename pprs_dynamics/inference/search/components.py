@@ -354,12 +354,11 @@ class Components:
         """
         if component not in self._nuisance:
             term, d = self.term(component), component.drive
-            units = np.eye(max(len(component.names), 1))
+            units = np.stack([component.every(unit)
+                              for unit in np.eye(max(len(component.names), 1))])
             kinds = {REVERSAL: joint_reversal_rows(self.design, term, component.names)} if (
-                d is None) else {
-                kind: {d: np.stack([rows(self.design, term, component.every(unit))
-                                    for unit in units])}
-                for kind, rows in ((REVERSAL, reversal_rows), (FORM, deviation_rows))}
+                d is None) else {kind: {d: rows(self.design, term, units)} for kind, rows in (
+                    (REVERSAL, reversal_rows), (FORM, deviation_rows))}
             weight = 1.0 if component.course is None else self._weight(component.course)
             self._nuisance[component] = {kind: transformed for kind, rows in kinds.items() if (
                 transformed := {
