@@ -18,16 +18,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from control_msgs_stand_in import install
 from node_bench import Bench, bench
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.node import Node
 from ros_processes import node_process
 
+from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
+
 fibonacci = pytest.importorskip('test_msgs.action').Fibonacci
-with pytest.MonkeyPatch.context() as patch:
-    install(patch)
-    from pprs_dynamics.ros.trajectory_proxy import ControllerError, GoalRelay
 pytestmark = pytest.mark.nodes
 
 SERVER = Path(__file__).parents[1] / 'support' / 'counting_controller.py'
