@@ -12,6 +12,7 @@ carries a load is not determined.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -130,8 +131,8 @@ class EngineState:
     def rest(self) -> Array:
         """Positions of all joints where the drives are at 0, (nq,): locked ones within limits."""
         model, rest = self.model, self.model.qpos0.copy()
-        for name, position in self.structure.locked.items():
-            k, at = self.number(name), self.place(name)
+        for name in self.structure.locked.keys() & self._numbers.keys():  # none is in an export
+            k, at, position = self.number(name), self.place(name), self.structure.locked[name]
             rest[at] = np.clip(position, *model.jnt_range[k]) if model.jnt_limited[k] else position
         for _ in self.couplings:  # chains of them
             for a, b, ratio, offset in self.couplings:
@@ -245,23 +246,27 @@ class EngineState:
                 raise ModelError(name, f'open by {np.max(np.abs(off)):.3g} in MuJoCo',
                                  'be closed as in the model: please report this file')
 
-    def driven(self, needed: Array, rows: Array) -> Array:
-        """Return the drives' efforts, (D,), that with forces of closures give what is needed.
 
-        Parameters
-        ----------
-        needed : (nv,) array
-            Efforts of all joints of the tree.
-        rows : (r, nv) array
-            Derivatives of the closures.
-        """
-        dofs = self.drives
-        if not len(rows) and len(dofs) == self.model.nv:
-            return needed[dofs]
-        columns = np.zeros((self.model.nv, len(dofs) + len(rows)))
-        columns[dofs, np.arange(len(dofs))] = 1.0
-        columns[:, len(dofs):] = rows.T
-        # Joints that stand are driven by whatever holds them.
-        moved = np.setdiff1d(np.arange(self.model.nv), self.standing)
-        return np.linalg.lstsq(columns[moved], needed[moved],
-                               rcond=LEAST_SINGULAR)[0][:len(dofs)]
+def add_sites(engine: Any, spec: Any, structure: Structure,
+              bodies: Mapping[int, tuple[Any, Frame]]) -> None:
+    """Add sites for the tool and both sides of each closure to a specification of MuJoCo.
+
+    Parameters
+    ----------
+    engine : module
+        MuJoCo.
+    spec : mujoco.MjSpec
+    structure : Structure
+    bodies : mapping of int to (body, Frame)
+        The body that each joint moves, 0 for the base, and its frame in the joint's.
+    """
+    t = structure.tables
+    sites = {TOOL: structure.links[structure.tool]} | {
+        f'{side}{k}': (int(row), Frame(R[k], p[k])) for side, rows, R, p in (
+            ('a', t.loop_a, t.a_R, t.a_p), ('b', t.loop_b, t.b_R, t.b_p))
+        for k, row in enumerate(rows)}
+    for name, (row, frame) in sites.items():
+        body, own = bodies[row]
+        there, quaternion = own.inverse @ frame, np.empty(4)
+        engine.mju_mat2Quat(quaternion, np.ascontiguousarray(there.R).ravel())
+        body.add_site(name=f'{SITE}{name}', pos=there.p, quat=quaternion)

@@ -13,6 +13,7 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion
@@ -187,8 +188,7 @@ def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
 ) -> None:
     monkeypatch.setenv('COLUMNS', '400')
     healthy, described = arm.real_arm(tmp_path), DriveModel.load(tmp_path / 'arm.yaml')
-    loaded = DriveModel.from_parameters({**healthy.values, 'effects.active': ['payload_mass'],
-                          'effects.payload_mass.mass': 1.5}, healthy.source)
+    loaded = with_effects(healthy, {'payload_mass': {'mass': 1.5}})
     for name, real, seed in (('healthy', healthy, 0), ('loaded', loaded, 1)):
         write_recording(tmp_path / f'{name}.csv', arm.record(real, arm.motion(20.0, seed=seed),
                                                              NOISE, seed))

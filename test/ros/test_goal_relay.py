@@ -23,7 +23,7 @@ from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.node import Node
 from ros_processes import node_process
 
-from pprs_dynamics.ros.trajectory_proxy import ControllerError, GoalRelay
+from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 
 fibonacci = pytest.importorskip('test_msgs.action').Fibonacci
 pytestmark = pytest.mark.nodes

@@ -34,7 +34,6 @@ from pprs_dynamics.system.plain_text import displayed
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
-
 NOWHERE = 'The error is not concentrated in any region.'
 FIRST = 3  # statements in the terminal, and on the first screen of the page
 COLOURS = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}

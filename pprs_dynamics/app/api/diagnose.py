@@ -48,7 +48,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
-
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_EFFECTS = 4  # rows and values without --details
 MOST_PLACES = 2  # of an unexplained error without --details

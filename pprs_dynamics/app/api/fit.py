@@ -26,7 +26,6 @@ from pprs_dynamics.physics.model.model_writer import write_model
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import Figure
 
-
 HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
             HALVES: 'each half of the recording predicted from the other',
             VALIDATION: 'the validation recordings'}

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings of a survey: from files, folders and globs, or from a manifest."""
+"""Recordings of a survey, from files, folders and globs or a manifest; and the store of results.
+
+A store is a folder with one Parquet file for each recording.
+"""
 
 from __future__ import annotations
 

@@ -203,12 +203,13 @@ def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, sta
     """Write samples as joint states, with stamps in their headers and as they are recorded."""
     connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
     types = typestore.types
-    velocity = np.empty((len(stamps), 0)) if samples.velocity is None else samples.velocity
-    for k, (stamp, at) in enumerate(zip(stamps.tolist(), recorded.tolist(), strict=True)):
+    none = np.empty((len(stamps), 0))
+    quantities = [np.ascontiguousarray(none if values is None else values, dtype=float)
+                  for values in (samples.position, samples.velocity, samples.effort)]
+    for stamp, at, *values in zip(stamps.tolist(), recorded.tolist(), *quantities, strict=True):
         header = types['std_msgs/msg/Header'](
             types['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9)), '')
-        message = types[JOINT_STATE](header, list(samples.drives), samples.position[k],
-                                     velocity[k], samples.effort[k])
+        message = types[JOINT_STATE](header, list(samples.drives), *values)
         writer.write(connection, at, typestore.serialize_cdr(message, JOINT_STATE))
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Routes of the workbench (HTTP and WebSocket): each one call of the session, and its result."""
+"""Routes of the workbench: checked requests, each one call of the session, and its answer."""
 
 from __future__ import annotations
 

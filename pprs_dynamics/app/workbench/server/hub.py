@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""State that all browsers share: the session, its worker thread, and uploads."""
+"""State that all browsers share: the session and its worker, files on offer, and uploads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.ros.live_joint_states import LiveNodes
-
 
 MOST_LISTED = 2000
 
