@@ -98,6 +98,41 @@ def test_no_other_amplitudes_have_a_higher_likelihood(seed: int) -> None:
     assert deviance(found)[0] - lowest < 1e-3
 
 
+def flicker(samples: int, rng: np.random.Generator) -> np.ndarray:
+    """Return 1/f noise of unit variance that goes on 16 times as long as it is recorded."""
+    root = np.sqrt(np.maximum(np.arange(8 * samples + 1), 1))
+    spectrum = (rng.normal(size=len(root)) + 1j * rng.normal(size=len(root))) / root
+    y = np.fft.irfft(np.where(root > 1, spectrum, 0))[:samples]
+    return np.asarray(y / y.std())
+
+
+NOISES = {
+    'white': lambda rng: rng.normal(size=2000),
+    'AR(1)': lambda rng: ar1(0.9, 2000, rng),
+    'slow AR(1)': lambda rng: ar1(0.998, 2000, rng),
+    '1/f': lambda rng: flicker(2000, rng),
+    'walk': lambda rng: 0.1 * np.cumsum(rng.normal(size=2000)),
+}
+
+
+def test_a_constant_is_judged_by_the_slow_noise_of_its_own_drive() -> None:
+    rng = np.random.default_rng(12)
+    beyond: dict[str, list[bool]] = {name: [] for name in NOISES}
+    offsets = []  # of four standard deviations on a white drive, in units of what is fitted
+    for _ in range(80):
+        # Two of each: an even number of drives, most of which drift.
+        names = [*NOISES, *NOISES]
+        regression, fit = fitted(np.stack([NOISES[name](rng) for name in names], axis=1))
+        for k, name in enumerate(names):
+            beyond[name].append(bool(fit.squares[k, 0] > 9 * fit.spectra[k, 0]))
+            if name == 'white':
+                offsets.append(4 / np.sqrt(fit.spectra[k, 0]))
+    shares = {name: np.mean(some) for name, some in beyond.items()}
+    assert np.mean(list(shares.values())) <= 0.01, shares
+    assert max(shares.values()) <= 0.03, shares  # of 160
+    assert np.median(offsets) > 3.4
+
+
 def test_a_vibration_is_no_noise() -> None:
     rng = np.random.default_rng(5)
     time = PERIOD * np.arange(4000)
