@@ -26,6 +26,7 @@ from pprs_dynamics.ros.force_command import (
     Feedforward,
     ForceCommand,
     parameters_for,
+    warn_without_limits,
 )
 from pprs_dynamics.ros.messages.conversions import (
     NANOSECONDS,
@@ -109,6 +110,7 @@ class FeedforwardNode(ManagedNode):
         model = self._settings.model
         self.get_logger().info(
             f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
+        warn_without_limits(self, model, self._settings.node_values)
         return super().on_activate(state)
 
     def _create_topics(self) -> None:

@@ -122,7 +122,7 @@ def test_a_constant_is_judged_by_the_slow_noise_of_its_own_drive() -> None:
     for _ in range(80):
         # Two of each: an even number of drives, most of which drift.
         names = [*NOISES, *NOISES]
-        regression, fit = fitted(np.stack([NOISES[name](rng) for name in names], axis=1))
+        fit = fitted(np.stack([NOISES[name](rng) for name in names], axis=1))[1]
         for k, name in enumerate(names):
             beyond[name].append(bool(fit.squares[k, 0] > 9 * fit.spectra[k, 0]))
             if name == 'white':
