@@ -97,6 +97,9 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     quiet = replace(residuals, measured=residuals.measured.copy(), model=residuals.model.copy())
     quiet.measured[:, 0], quiet.model[:, 0] = 3.0 + noise, 3.0
     assert little_explained(model, quiet) == {}
+    # A force that varies more than all that was measured is not hidden in noise.
+    quiet.model[:, 0] += 3 * noise.std() * np.sin(np.arange(len(residuals)) / 50)
+    assert set(little_explained(model, quiet)) == ({'turn'} if size else set())
     still = replace(residuals, measured=residuals.measured.copy(), variables={
         **residuals.variables, 'velocity': residuals.variables['velocity'] * [0.0, 1.0, 1.0]})
     still.measured[:, 0] = 5 * np.sin(np.arange(len(residuals)) / 50)
