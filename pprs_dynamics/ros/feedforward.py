@@ -99,7 +99,8 @@ class FeedforwardNode(ManagedNode):
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
         self._status = StatusReporter(
-            self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
+            self, {}, self._counters, hardware_of(self._settings.model), self._refresh,
+            ('~/commands',))
         self._refresh()
         self.begin(node_values[AUTOSTART.name])
 
