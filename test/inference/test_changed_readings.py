@@ -14,7 +14,6 @@ from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.evidence import Evidence
 from pprs_dynamics.inference.readings.findings import OtherReading
-from pprs_dynamics.inference.readings.table import plain
 from pprs_dynamics.inference.residuals.excerpt import excerpt_of
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
@@ -59,7 +58,7 @@ def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     position[:held] = position[held]
     excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort), 3)
     assert excerpt is not None
-    evidence = Evidence.of(MODEL, excerpt, plain(6))
+    evidence = Evidence.of(MODEL, excerpt)
     assert evidence is not None
     effort[:held] = evidence.force[excerpt.time < TIME[held // 2]][-1]
     effort[:held, 1] = 20.0

@@ -26,7 +26,12 @@ from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search import candidates as candidates_module
 from pprs_dynamics.inference.search import components as components_module
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.candidates import (
+    Candidates,
+    CandidateSet,
+    Component,
+    EffectCandidate,
+)
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -216,7 +221,8 @@ def tabulated(number: int, barred: str = '') -> tuple[ModelTable, Costs]:
     """Return a table in which sets with an effect are inadmissible, and its costs by names."""
     fits = FittedSets(random_design(TWO, number), DECISIONS)
     fits.form_errors = SimpleNamespace(  # type: ignore[assignment]
-        reason=lambda fitted: 'form' * (barred in {one.name for one in fitted.effects}))
+        reason=lambda fitted, covariance: (
+            'form' * (barred in {one.name for one in fitted.effects}), None))
     costs: Costs = {}
     for size in range(3):
         for chosen in combinations(everything(), size):
@@ -287,13 +293,24 @@ def test_sets_with_a_nonlinear_effect_are_those_of_the_last_search(
         assert row.fits is (last if 'structure_2' in row.placed_names else first)
 
 
-def test_the_search_ends_at_an_admissible_set() -> None:
-    fits = FittedSets(random_design({('structure_4', None): 1.5}, 1), DECISIONS)
-    fits.form_errors = SimpleNamespace(  # type: ignore[assignment]
-        reason=lambda fitted: 'form' * ('structure_4' in {one.name for one in fitted.effects}))
+@pytest.mark.parametrize('number', range(2))
+def test_a_set_costs_no_more_than_with_its_form_error(number: int) -> None:
+    """Where structure_4 can only be a form error, no set has it, and all cost as with it."""
+    fits, free = (FittedSets(random_design({('structure_4', None): 1.5}, number), DECISIONS)
+                  for _ in range(2))
+
+    def reason(fitted: CandidateSet, covariance: Array) -> tuple[str, Candidates | None]:
+        form = next((one for one in fitted.effects if one.name == 'structure_4'), None)
+        return ('form', fitted.without(form)) if form else ('', None)
+    fits.form_errors = SimpleNamespace(reason=reason)  # type: ignore[assignment]
     found = Search(fits).run()
     assert found.is_admissible
     assert 'structure_4' not in {name for name, _ in sets_of(found)}
+    form = next(one for one in everything() if one.name == 'structure_4')
+    for other in (one for one in everything() if one.name in ('structure_3', 'drive_1')):
+        fits.evaluate((other, form))
+        assert fits.evaluate((other,)).cost == pytest.approx(min(
+            free.evaluate(chosen).cost for chosen in ((other,), (other, form))))
 
 
 def test_blocks_are_predicted_worse_than_they_are_fitted() -> None:

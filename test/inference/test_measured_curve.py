@@ -117,3 +117,9 @@ def test_what_is_no_curve_is_refused_in_a_sentence(
     values = {f'effects.measured_curve.lift_1.{key}': value for key, value in curve.items()}
     with pytest.raises(ModelError, match=said):
         DriveModel.from_parameters({**model.values, 'effects.active': ['measured_curve'], **values})
+
+
+def test_a_curve_that_is_not_active_may_be_given_key_by_key(model: DriveModel) -> None:
+    """As a node gets it."""
+    key = f'effects.measured_curve.{model.drives[0]}.values'
+    assert DriveModel.from_parameters({**model.values, key: [0.0] * 4}).values[key] == [0.0] * 4

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_files import ARM, arm_efforts, drawn, motion
+from made_up_files import ARM, SLIDE, arm_efforts, drawn, motion
 
 from pprs_dynamics.app.api.first_model import FirstModel, first_model
 from pprs_dynamics.errors import MotionError, PprsError
@@ -296,3 +296,26 @@ def test_commands_alone_are_a_question(head: str, tmp_path: Path) -> None:
     time, q, _, effort = run_of_arm()
     assert 'commands by their names' in ''.join(asked_about(
         tmp_path, head, time, q, effort).questions)
+
+
+@pytest.mark.parametrize('width', [1e-4, 0.05])
+@pytest.mark.parametrize(('stroke', 'position', 'effort'), [
+    (0.5, 1e3, 1.0), (0.5, 1.0, 1e-3), (0.5, 1e3, 1e-3), (1e3, 1e3, 1.0), (1e3, 1.0, 1.0)])
+def test_units_of_a_slide_without_weight_are_right_or_a_question(
+    width: float, stroke: float, position: float, effort: float, tmp_path: Path,
+) -> None:
+    """Inertia alone gives millimetres and newtons the same likelihood as metres and kN."""
+    random = np.random.default_rng(3)
+    time, q, v, a = motion(random, 1, 0.15)
+    force = 8 * a + 15 * v + 6 * np.tanh(v / width) + random.normal(0, 0.03, q.shape)
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.column_stack([time, position * q, effort * force]), delimiter=',',
+               comments='', header='time,q,tau', fmt='%.8g')
+    lying = SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"')
+    (tmp_path / 'robot.urdf').write_text(lying.replace(
+        'lower="-0.5" upper="0.5"', f'lower="{-stroke}" upper="{stroke}"'))
+    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
+    found = read_recording(path, first.model.recorded)
+    is_right = np.allclose(found.position, q, atol=1e-6) and np.allclose(
+        found.effort, force, atol=1e-3)
+    assert is_right or ' or ' in ''.join(first.questions)

@@ -102,6 +102,18 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
                     rtol=0, atol=ROUNDING)
 
 
+def test_a_state_with_one_drive_that_accelerates_more_is_that_of_such_a_motion(robot, motion):
+    model = model_of(robot, NUMBERS)
+    state = model.mechanism(motion)
+    changed = state.accelerated(2, 0.7)
+    expected = state.acceleration + 0.7 * (np.arange(6) == 2)
+    assert_allclose(model.mechanism(changed.motion).acceleration, expected, atol=1e-7)
+    forces = model.drive_forces(changed.motion)
+    assert_allclose(changed.rigid_force, forces.parts['rigid_body'], atol=ROUNDING)
+    rubbing = next(effect for effect in model.effects if effect.name == 'passive_friction')
+    assert_allclose(rubbing.force(changed), forces.parts['passive_friction'], atol=ROUNDING)
+
+
 # Friction in the joints ----------------------------------------------------------------------
 
 def test_active_friction_is_viscous_plus_load_times_sign(robot, motion):

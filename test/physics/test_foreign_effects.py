@@ -17,7 +17,8 @@ from feedforward_bench import random_motion
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
-from pprs_dynamics.physics.effects.catalogue import check_columns
+from pprs_dynamics.physics.effects.catalogue import check_columns, guard
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 
 ONE = random_motion(np.random.default_rng(11), 3)[:1]
 
@@ -76,6 +77,22 @@ def test_wrong_columns_are_found_when_the_package_is_loaded(
     fail(package, 'columns', fault)
     with pytest.raises(EffectError, match=re.escape(told)):
         check_columns(package.WornBrake)
+
+
+@pytest.mark.parametrize('method', ['may_show', 'deviations', 'bound'])
+def test_whatever_a_diagnosis_asks_is_one_error_with_the_name(method: str) -> None:
+    def fails(cls: type, _: Any) -> None:
+        raise ZeroDivisionError('by a foreign effect')
+    fails.__name__ = method
+
+    def columns(cls: type, drive: DriveSamples) -> tuple[Any, ...]:
+        return (drive.velocity,)
+
+    effect: Any = type('Drag', (DriveEffect,), {
+        'name': 'drag', 'linear': (), 'columns': classmethod(columns), method: classmethod(fails)})
+    guard(effect)
+    with pytest.raises(EffectError, match=f'effect drag: {method} raised ZeroDivisionError'):
+        getattr(effect, method)(DriveRange(1.0, 0.1, 0.2, 0.3))
 
 
 def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(

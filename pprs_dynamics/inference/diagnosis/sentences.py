@@ -221,6 +221,8 @@ def _rise(cost: float) -> str:
 
 
 def _cost(ranked: RankedSet) -> str:
+    if abs(ranked.cost) < 0.5:
+        return 'costs as much'
     return f'costs {_rise(ranked.cost)[1:]} {"less" if ranked.cost < 0 else "more"}'
 
 

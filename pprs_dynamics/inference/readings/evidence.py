@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import comb
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
@@ -16,12 +16,13 @@ from scipy.optimize import nnls
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
-from pprs_dynamics.inference.readings.table import Reading, plain
+from pprs_dynamics.inference.readings.table import Reading
 from pprs_dynamics.inference.residuals.excerpt import PIECE, Excerpt, excerpt_of
 from pprs_dynamics.inference.residuals.reconstruction import follow
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -69,13 +70,14 @@ class Evidence:
     force: Array
 
     @classmethod
-    def of(cls, model: DriveModel, excerpt: Excerpt, reading: Reading, in_pieces: bool = False,
+    def of(cls, model: DriveModel, excerpt: Excerpt, reading: Reading | None = None,
            ) -> Evidence | None:
         """Return the evidence of a reading of an excerpt; None where no motion can be followed.
 
-        With `in_pieces` a motion may be followed in parts alone.
+        Without a reading, as it was recorded: such a motion may be followed in parts alone.
         """
-        motion = read_motion(excerpt.motion, reading)
+        in_pieces = reading is None
+        motion = excerpt.motion if reading is None else read_motion(excerpt.motion, reading)
         position = motion.position
         moved = replace(motion, position=position - model.position_error(position))
         count = len(position)
@@ -94,11 +96,10 @@ class Evidence:
         followed = np.asarray(np.isfinite(forces).all(axis=0))
         if not np.any(followed):
             return None
-        # A drive that is always slow turns over within its own speeds.
+        # A width of its own would be evidence for a unit of velocities.
         speed = np.sqrt(np.mean(motion.velocity ** 2, axis=0))
-        width = np.minimum(model.reversal.velocity, table.REVERSAL * speed + 1e-300)
-        columns = np.stack([*forces, motion.velocity, smooth_sign(motion.velocity, width),
-                            np.ones_like(position)], axis=2)
+        direction = smooth_sign(motion.velocity, table.REVERSAL * speed + 1e-300)
+        columns = np.stack([*forces, motion.velocity, direction, np.ones_like(position)], axis=2)
         columns = np.where(followed[:, :, None], columns, 0.0)
         known = np.isfinite(excerpt.effort)
         effort = np.where(known, excerpt.effort, 0.0)
@@ -193,6 +194,24 @@ def _is_steady(root: Array, force: Array) -> bool:
     ones = root[:, CONSTANT]
     size, mean = float(force @ force), float(force @ ones) / max(float(ones @ ones), 1e-300)
     return size - mean ** 2 * float(ones @ ones) < table.STEADY ** 2 * size
+
+
+def gravity_in(model: DriveModel, direction: Array) -> tuple[str, tuple[float, ...]]:
+    """Return the key of a model's gravity, and gravity in another direction [m/s^2]."""
+    key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
+    return key, tuple((np.linalg.norm(model.values[key]) * direction + 0.0).tolist())
+
+
+def in_reading(model: DriveModel, reading: Reading) -> DriveModel:
+    """Return a model under the gravity, and with the load, of a reading."""
+    changes: dict[str, Any] = {}
+    if reading.gravity is not None:
+        changes = dict([gravity_in(model, reading.gravity)])
+    if reading.load:
+        changes |= {'effects.active': (*model.values.get('effects.active', ()), PayloadMass.name),
+                    f'effects.{PayloadMass.name}.mass': reading.load}
+    return DriveModel.from_parameters({**model.values, **changes}, model.source) if (
+        changes) else model
 
 
 def read_motion(motion: DriveMotion, reading: Reading) -> DriveMotion:
@@ -336,7 +355,7 @@ def effort_contents(model: DriveModel, recording: Recording, evidence: Evidence 
     if evidence is None:
         excerpt = excerpt_of(recording, table.STRETCHES)
         evidence = None if excerpt is None else Evidence.of(
-            model, excerpt, plain(len(model.drives)))
+            model, excerpt)
     if evidence is None:
         return {}
     width = np.broadcast_to(model.reversal.velocity, (len(model.drives),))

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,8 @@ from pprs_dynamics.measurement.files.samples import Indices
 
 # ------------------------------------------------------------------------------------- units
 
-LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
+MICROMETRE = 1e-6
+LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', MICROMETRE: 'micrometres'}
 ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns'}
 # Encoders, tried where all positions are whole numbers.
 COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
@@ -54,8 +55,8 @@ CLOSEST = 2e-4
 MASSES, MASSES_MOST = 0.35, 7.0
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
-# Width in which friction turns over, at most, as a share of a drive's speeds.
-REVERSAL = 0.2
+# Width in which friction turns over, as a share of a drive's root mean square of velocity.
+REVERSAL = 0.03
 # Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
@@ -64,6 +65,7 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
         'drive_constant': 10.0, 'load': 1.0}
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
+RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
@@ -196,14 +198,14 @@ MOST_TURNED = 3  # drives of which two zeros at a time are tried
 
 @dataclass(frozen=True)
 class Reading:
-    """A way to read the columns of a recording.
+    """A hypothesis: a way to read a recording of D drives.
 
     Parameters
     ----------
     kind : str
-        Key of `COST`; empty for the plain reading.
+        Key of `COST`; empty for the plain reading of positions and drives.
     what : str
-        The mistake as a clause.
+        The mistake of times, positions or drives as a clause.
     drives : tuple of int
         Those it concerns.
     cost : float
@@ -212,10 +214,18 @@ class Reading:
         Factors of recorded positions, and what is added to them.
     positions, efforts : (D,) int arrays
         Recorded columns of the drives' positions and efforts.
+    effort_scale : (D,) array
+        Recorded efforts, as multiples of those in SI units.
+    share : str
+        What share of a drive's largest effort the efforts are; empty where they are none.
+    time_unit : float
+        [s].
     gravity : (3,) array, optional
         Direction of gravity in the base, if it is not the model's.
     load : float
         At the tool, beyond the model's [kg].
+    parts : tuple of Reading
+        Mistakes of which it is made.
     """
 
     kind: str
@@ -226,79 +236,104 @@ class Reading:
     offset: Array
     positions: Indices
     efforts: Indices
+    effort_scale: Array
+    share: str = ''
+    time_unit: float = 1.0
     gravity: Array | None = None
     load: float = 0.0
+    parts: tuple[Reading, ...] = ()
 
-    def changed(self, kind: str, what: str, drives: tuple[int, ...], cost: float, **more: Any,
-                ) -> Reading:
-        """Return another reading that differs in some arrays."""
-        return replace(self, kind=kind, what=what, drives=drives, cost=cost, **more)
+    @property
+    def kinds(self) -> set[str]:
+        """Kinds of its mistakes: a load is none."""
+        return {part.kind for part in self.parts} - {'load'}
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the reading by names and units."""
+        return not self.kinds and bool(np.all(self.effort_scale == 1))
+
+    @property
+    def of_motion(self) -> bytes:
+        """What decides which forces the model has."""
+        return np.concatenate([self.scale, self.offset, self.positions, [] if (
+            self.gravity is None) else self.gravity, [self.load, self.time_unit]]).tobytes()
+
+    def after(self, first: Reading) -> Reading:
+        """Return the reading that makes the mistakes of another one, and this one."""
+        return replace(
+            self, cost=first.cost + self.cost, scale=first.scale * self.scale,
+            offset=first.offset * self.scale + self.offset, load=first.load + self.load,
+            time_unit=first.time_unit * self.time_unit, parts=(*first.parts, self),
+            gravity=first.gravity if self.gravity is None else self.gravity)
 
 
-def plain(count: int) -> Reading:
-    """Return the reading of D drives by names and units."""
-    same = np.arange(count)
-    return Reading('', '', (), 0.0, np.ones(count), np.zeros(count), same, same)
-
-
-def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: bool = False,
-             ) -> Iterator[Reading]:
-    """Yield all readings of D drives but the plain one, those of another order last.
+def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequence[float] = (),
+             times: Sequence[float] = (), are_counts: bool = False) -> list[Reading]:
+    """Return the table of readings of D drives: first the plain one, other orders last.
 
     Parameters
     ----------
     drives : tuple of D str
     units : sequence of D DriveUnits
+    loads : sequence of float
+        That may be at the tool [kg].
+    times : sequence of float
+        Units in which times may be [s].
     are_counts : bool
         Whether all positions are whole numbers, as encoders count.
     """
-    count = len(drives)
-    first, every = plain(count), tuple(range(count))
+    every = tuple(range(len(drives)))
+    same, zero, one = np.arange(len(drives)), np.zeros(len(drives)), np.ones(len(drives))
+    rows = [Reading('', '', (), 0.0, one, zero, same, same, one)]
+
+    def add(kind: str, what: str, group: tuple[int, ...], more: float = 0.0, **changes: Any,
+            ) -> None:
+        rows.append(replace(rows[0], kind=kind, what=what, drives=group, cost=COST[kind] + more,
+                            **changes))
+
+    for unit in times:
+        add('time_unit', f'the times look like {TIMES[unit]}: as seconds they make the motion '
+            f'{1 / unit:.0f} times too slow for its efforts', (), time_unit=unit)
+    for load in loads:
+        add('load', '', (), load=load)
     angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for names, turns in ((LENGTHS, False), (angles, True)):
         alike = tuple(k for k in every if units[k].turns == turns)
         for unit, name in names.items():
             # Encoders of a robot's turning joints count alike; its rails may not.
             for group in _groups(drives, alike)[:1 if turns else None]:
-                scale = _scaled(count, group, unit)
-                cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
+                scale, few = np.where(np.isin(same, group), unit, 1.0), FEW * (
+                    len(group) < len(alike))
+                few += RARE * (unit == MICROMETRE)
                 what = f'the {_position(drives, group)} like {name}'
-                yield first.changed('position_unit', what, group, cost, scale=scale)
+                add('position_unit', what, group, few, scale=scale)
                 if unit in COUNTS:
-                    yield first.changed(
-                        'position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
-                        cost + 1, scale=scale,
-                        offset=np.where(_scaled(count, group, -1.0) < 0, -math.pi, 0.0))
+                    add('position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
+                        few + 1, scale=scale, offset=-math.pi * np.isin(same, group))
     for group in _groups(drives, every):
-        yield first.changed(
-            'position_sign', f'the {_position(drives, group)} negated', group,
-            COST['position_sign'] + (ALL_NEGATED if len(group) == count > 1 else 0.0),
-            scale=_scaled(count, group, -1.0))
+        add('position_sign', f'the {_position(drives, group)} negated', group, ALL_NEGATED * (
+            len(group) == len(every) > 1), scale=np.where(np.isin(same, group), -1.0, 1.0))
     for direction, name in MOUNTINGS.items():
-        yield first.changed(
-            'mounting', f'the base looks mounted so that gravity points along its {name}', every,
-            COST['mounting'], gravity=np.array(direction, float))
-    for order in _orders(count):
-        moved = tuple(k for k in every if order[k] != k)
+        add('mounting', f'the base looks mounted so that gravity points along its {name}', every,
+            gravity=np.array(direction, float))
+    turned = [{k: turn} for k in every if units[k].turns for turn in QUARTERS]
+    if len(turned) <= MOST_TURNED * len(QUARTERS):  # two may be off together
+        turned += [first | second for first, second in combinations(turned, 2)
+                   if first.keys() != second.keys()]
+    for offsets in turned:
+        listed = ', '.join(f'{QUARTERS[turn]} degrees ({drives[k]})' for k, turn in offsets.items())
+        add('position_offset', f'the zero of {named(drives, (*offsets,))} looks off: {listed} are '
+            'to be added to its positions', (*offsets,), COST['position_offset'] * (
+                len(offsets) - 1), offset=np.array([offsets.get(k, 0.0) for k in every]))
+    for order in _orders(len(drives)):
+        moved, other = tuple(k for k in every if order[k] != k), np.array(order)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
-        turned = np.array(order)
-        for noun, changes in (('drives', {'positions': turned, 'efforts': turned}),
-                              ('positions', {'positions': turned}), ('efforts', {
-                                  'efforts': turned})):
-            yield first.changed('drive_order', f'the {noun} look recorded in another order: '
-                                f'{listed}', moved, COST['drive_order'], **changes)
-
-
-def quarter_turn(drives: tuple[str, ...], drive: int, turn: float, before: Reading) -> Reading:
-    """Return another reading, with the zero of one drive a quarter turn or two elsewhere."""
-    offset = before.offset.copy()
-    offset[drive] += turn
-    group = tuple(np.flatnonzero(offset).tolist())
-    listed = ', '.join(f'{QUARTERS.get(float(offset[k]), np.rad2deg(offset[k])):g} degrees '
-                       f'({drives[k]})' for k in group)
-    return before.changed('position_offset', f'the zero of {named(drives, group)} looks off: '
-                          f'{listed} are to be added to its positions', group,
-                          before.cost + COST['position_offset'], offset=offset)
+        for noun, positions, efforts in (('drives', other, other), ('positions', other, same),
+                                         ('efforts', same, other)):
+            add('drive_order', f'the {noun} look recorded in another order: {listed}', moved,
+                positions=positions, efforts=efforts)
+    return rows
 
 
 def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
@@ -341,8 +376,3 @@ def _orders(count: int) -> list[tuple[int, ...]]:
     return sorted(found - {same}, key=lambda order: (
         sum(k != place for place, k in enumerate(order)), order))
 
-
-def _scaled(count: int, group: tuple[int, ...], factor: float) -> Array:
-    scale = np.ones(count)
-    scale[list(group)] = factor
-    return scale

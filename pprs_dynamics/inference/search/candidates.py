@@ -58,6 +58,8 @@ class CostTerms:
     linearisation : float
         By how much the exact forces of its own fitted model fit worse than the linear ones; 0
         where that was not computed.
+    forms : float
+        What a form error of its effects explains, less than nothing.
     """
 
     fit: float = 0.0
@@ -68,6 +70,7 @@ class CostTerms:
     signs: float = 0.0
     feasibility: float = 0.0
     linearisation: float = 0.0
+    forms: float = 0.0
 
     @property
     def total(self) -> float:
@@ -310,6 +313,7 @@ class UnknownCandidate:
 
 
 Candidate = EffectCandidate | UnknownCandidate
+Candidates = tuple[Candidate, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,6 +333,10 @@ class CandidateSet:
     barred : str
         Why it is inadmissible: no possible values come near, or a candidate may be the form error
         of others; '' for an admissible set.
+    form_of : tuple of Candidate, optional
+        The set of which one of its candidates may be a form error.
+    with_form : CandidateSet, optional
+        The set with a form error of this one, by which it costs less.
     """
 
     candidates: tuple[Candidate, ...]
@@ -337,6 +345,8 @@ class CandidateSet:
     blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
     nuisance: Mapping[Component, Mapping[str, Block]] = field(default_factory=dict, repr=False)
     barred: str = ''
+    form_of: Candidates | None = field(default=None, repr=False)
+    with_form: CandidateSet | None = field(default=None, repr=False)
 
     @property
     def nuisance_blocks(self) -> tuple[Block, ...]:
@@ -347,6 +357,11 @@ class CandidateSet:
     def total(self) -> float:
         """What its terms add up to, whether it may be or not."""
         return self.terms.total
+
+    @property
+    def plain(self) -> float:
+        """What its terms add up to without form errors."""
+        return self.total - self.terms.forms
 
     @property
     def is_admissible(self) -> bool:
@@ -508,3 +523,13 @@ class PriorCosts:
         e = self.decisions.wrong_sign_odds
         return -2 * float(log(2) + np.logaddexp(log1p(-e) + log_ndtr(deviations),
                                                 log(e) + log_ndtr(-deviations)))
+
+
+def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:
+    """Return candidates with more components, each in the candidate of its effect if there is."""
+    for component in components:
+        old = next((c for c in candidates if isinstance(c, EffectCandidate)
+                    and c.effect is component.effect and c.course == component.course), None)
+        candidates = (*(c for c in candidates if c is not old),
+                      EffectCandidate.of([*(old.components if old else ()), component]))
+    return candidates

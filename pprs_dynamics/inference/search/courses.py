@@ -21,11 +21,12 @@ from pprs_dynamics.inference.search.candidates import (
     DRIFT,
     DURING,
     SINCE,
+    Candidates,
     CandidateSet,
     Course,
     EffectCandidate,
 )
-from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 
 # Onsets that are tried, and stretches: so many parts of the recordings, each of so many of them

@@ -19,7 +19,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
     LOAD,
-    Candidate,
+    Candidates,
     CandidateSet,
     Component,
     CostTerms,
@@ -39,7 +39,6 @@ LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
 
-Candidates = tuple[Candidate, ...]
 Nuisance = Mapping[Component, Mapping[str, Block]]
 
 
@@ -96,11 +95,23 @@ class FittedSets:
         key = set_key(candidates)
         if key not in self._evaluated:
             fitted = self._fitted(tuple(sorted(candidates, key=lambda c: c.rank)))
-            self._evaluated[key] = fitted
-            if self._best is None or fitted.cost < self._best.cost:
-                self._best = fitted
+            self._keep(fitted)
             self.stepped()
+            if fitted.form_of is not None:
+                self._explain(fitted, fitted.form_of)
         return self._evaluated[key]
+
+    def _keep(self, fitted: CandidateSet) -> None:
+        self._evaluated[fitted.key] = fitted
+        if self._best is None or fitted.cost < self._best.cost or fitted.key == self._best.key:
+            self._best = fitted
+
+    def _explain(self, fitted: CandidateSet, form_of: Candidates) -> None:
+        """Let the set of which a candidate is a form error cost no more than with it."""
+        less = self.evaluate(form_of)
+        if fitted.plain < less.total:
+            self._keep(replace(less, with_form=fitted, terms=replace(
+                less.terms, forms=fitted.plain - less.plain)))
 
     def _fitted(self, candidates: Candidates) -> CandidateSet:
         if not candidates:
@@ -125,7 +136,8 @@ class FittedSets:
             moved = replace(fitted, fit=possible)
             signs = CostTerms(signs=self._signs(moved, fit.covariance) - fitted.terms.signs)
             fitted = replace(moved, terms=fitted.terms + signs + feasible)
-        return replace(fitted, barred=self.form_errors.reason(fitted))
+        barred, form_of = self.form_errors.reason(fitted, fit.covariance)
+        return replace(fitted, barred=barred, form_of=form_of)
 
     def pruned(self, fitted: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""

@@ -4,13 +4,16 @@
 """The form error of idealised effects, and whether a candidate is no more than that.
 
 Real friction, springs and cords differ from the catalogue's forms by up to `Decisions.form_share`
-of their force. Masses, gravity and sensors are exact: admissible, and no form error of others. An
-idealised candidate is inadmissible if its force
-beyond all other candidates is smaller than the form error of these: the data cannot separate the
-two. With other candidates the input model's friction counts with `Decisions.own_form_share`.
+of their force. Masses, gravity and sensors are exact: admissible, and no form error of others. A
+set with an idealised candidate is inadmissible if the candidate's force beyond all others is
+smaller than the form error of these: the data cannot separate the two. The set without the
+candidate then explains as much by a form error, and costs as little. With other candidates the
+input model's friction counts with `Decisions.own_form_share`.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,8 +21,16 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    Candidates,
+    CandidateSet,
+    EffectCandidate,
+    joined,
+)
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
@@ -30,7 +41,11 @@ SHAPES = 4
 # Ends of the names of coefficients that are of one direction, and of the other.
 SIDES = {'forward': 'backward', 'backward': 'forward', 'driving': 'driven_back',
          'driven_back': 'driving'}
+# Beginnings of these names, and the effect that is the same in both directions.
+SYMMETRIC = {'force': 'coulomb_friction', 'viscous': 'viscous_friction', 'driv': 'load_friction'}
 Squares = dict[int, float]  # whitened squares of a force by drive
+# The idealised effects with a force on a drive, and their whitened forces there.
+Forces = dict[int, tuple[list[EffectCandidate], Array]]
 
 
 class FormErrors:
@@ -44,7 +59,7 @@ class FormErrors:
     """
 
     def __init__(self, design: Design, regression: Regression, decisions: Decisions) -> None:
-        self.regression, self.decisions = regression, decisions
+        self.design, self.regression, self.decisions = design, regression, decisions
         # Reference runs contain what the forces of the input model lack of real ones.
         given = () if design.carried is not None else design.given.effects
         self._shares = {
@@ -60,33 +75,72 @@ class FormErrors:
             for name in self._shares}
 
     @outside_cost('a row is inadmissible if one of its effects is smaller than the form error of '
-                  'the others')
-    def reason(self, fitted: CandidateSet) -> str:
-        """Return which candidate may be the form error of others; '' for none."""
-        forces = self.forces(fitted)
-        for candidate in fitted.candidates:
-            names: tuple[str, ...] = ()
-            if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
-                names = ('friction that is the same in both directions',)
-            else:
-                drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
-                allowed, others = self.beside(fitted, candidate, drives,
-                                              len(fitted.candidates) > 1, forces)
-                if others and self._beyond_others(fitted, candidate) < allowed:
-                    names = others
-            if names:
-                return f'{candidate.name} may be the form error of {", ".join(names)}'
-        return ''
+                  'the others; the row without this effect costs no more')
+    def reason(self, fitted: CandidateSet, covariance: Array) -> tuple[str, Candidates | None]:
+        """Return why a candidate may be a form error, and the set of which it may be one.
 
-    def forces(self, fitted: CandidateSet) -> list[tuple[EffectCandidate, Squares]]:
-        """Return the idealised effects of a set with the squares of their forces."""
-        return [(effect, self._squares(fitted, effect)) for effect in fitted.effects
-                if effect.effect.idealised]
+        Of several the candidate that the others replace best; '' and None where there is none.
+        No set is returned where the form of the input model's friction alone is in doubt.
+
+        Parameters
+        ----------
+        fitted : CandidateSet
+        covariance : (P, P) array
+            Of its coefficients without constraints.
+        """
+        forces, least = self.forces(fitted), 1.0
+        found: tuple[str, Candidates | None] = '', None
+        for candidate in fitted.candidates:
+            if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
+                return (f'{candidate.name} may be the form error of friction that is the same in '
+                        'both directions'), self._symmetric(fitted, candidate)
+            drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
+            allowed, names = self.beside(fitted, candidate, drives, len(fitted.candidates) > 1,
+                                         forces)
+            if not names:
+                continue
+            size = self._beyond_others(fitted, candidate, covariance)
+            if size < least * allowed:
+                least = size / allowed
+                found = (f'{candidate.name} may be the form error of {", ".join(names)}',
+                         None if self._own.issuperset(names) else fitted.without(candidate))
+        return found
+
+    def _symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> Candidates:
+        """Return a set with friction that is the same in both directions for one that is not."""
+        found = fitted.without(candidate)
+        for component in candidate.components:
+            known = {(one.effect.name, one.drive) for c in found for one in c.components}
+            for name in {SYMMETRIC[start] for start in SYMMETRIC for given in component.names
+                         if given.startswith(start)}:
+                if (name, component.drive) not in known:
+                    effect = catalogue()[name]
+                    found = joined(found, [replace(placed(
+                        self.design, effect, component.drive, {},
+                        tuple(c.name for c in effect.coefficients)), course=component.course)])
+        return found
+
+    def forces(self, fitted: CandidateSet) -> Forces:
+        """Return the whitened forces of a set's idealised effects by drive."""
+        effects = [effect for effect in fitted.effects if effect.effect.idealised]
+        found: Forces = {}
+        for d in self.regression.drives:
+            acting = {effect: [block for block in fitted.blocks_of(effect) if d in block.rows]
+                      for effect in effects}
+            acting = {effect: blocks for effect, blocks in acting.items() if blocks}
+            if acting:
+                forces = np.array([sum(fitted.fit.of(block) @ block.rows[d] for block in blocks)
+                                   for blocks in acting.values()])
+                found[d] = list(acting), forces * np.sqrt(self.regression.series[d].spread(
+                    self.regression.weights(fitted.fit, d)))
+        return found
 
     def beside(self, fitted: CandidateSet, candidate: Candidate, drives: set[int],
-               with_own: bool = True, forces: list[tuple[EffectCandidate, Squares]] | None = None,
+               with_own: bool = True, forces: Forces | None = None,
                ) -> tuple[float, tuple[str, ...]]:
         """Return the whitened square of the form errors of other effects, and their names.
+
+        It is a share of the sum of their forces: two that cancel are no force of a machine.
 
         Parameters
         ----------
@@ -96,23 +150,28 @@ class FormErrors:
             On which they count.
         with_own : bool
             With that of the input model's friction.
-        forces : list, optional
+        forces : mapping, optional
             Of `forces`, where it is known.
         """
         if isinstance(candidate, EffectCandidate) and not (
                 candidate.effect.idealised or candidate.effect.shows_at_reversals):
             return 0.0, ()  # little looks like masses, gravity and sensors
         share = self.decisions.form_share / SHAPES ** 0.5
-        squares = {
-            other.name: share ** 2 * sum(size for d, size in of_drives.items() if d in drives)
-            for other, of_drives in (self.forces(fitted) if forces is None else forces)
-            if other is not candidate and (len(drives) > 1 or _is_free(other))}
+        square, names = 0.0, dict[str, None]()
+        for d, (effects, white) in (self.forces(fitted) if forces is None else forces).items():
+            others = [k for k, other in enumerate(effects) if d in drives
+                      and other is not candidate and (len(drives) > 1 or _is_free(other))]
+            total = white[others].sum(axis=0)
+            square += share ** 2 * float(total @ total)
+            names |= dict.fromkeys(effects[k].name for k in others)
         for name, by_band in self._given.items():
             is_own = name in self._own
             if not is_own or with_own:
-                squares[name] = (self._shares[name] if is_own else share) ** 2 * sum(
+                own = (self._shares[name] if is_own else share) ** 2 * sum(
                     float(by_band[d] @ self.regression.weights(fitted.fit, d)) for d in drives)
-        return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)
+                square += own
+                names |= {name: None} if own > 0 else {}
+        return square, tuple(names)
 
     def _is_symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> bool:
         """Return whether friction that differs by direction does so by less than its form error."""
@@ -133,7 +192,8 @@ class FormErrors:
             whole += sum(self._of_block(fitted, block, (c + mirrored) / 2).values())
         return half < self.decisions.form_share ** 2 * whole
 
-    def _beyond_others(self, fitted: CandidateSet, candidate: Candidate) -> float:
+    def _beyond_others(self, fitted: CandidateSet, candidate: Candidate, covariance: Array,
+                       ) -> float:
         """Return the whitened square of a candidate's force that no refit of others replaces."""
         blocks = fitted.blocks_of(candidate)
         if any(block.mean is not None for block in blocks):
@@ -142,11 +202,9 @@ class FormErrors:
         index = fitted.fit.index_of([*blocks, *(
             block for component in candidate.components
             for block in fitted.nuisance.get(component, {}).values())])
-        std = np.sqrt(np.maximum(fitted.fit.covariance[index, index], 0))
-        # Constraints hold some coefficients, of which the variance is 0; units must not count.
-        index, std = index[std > 0], std[std > 0]
+        std = np.sqrt(np.diag(covariance)[index])  # units must not count
         scaled = fitted.fit.coefficients[index] / std
-        correlation = fitted.fit.covariance[np.ix_(index, index)] / np.outer(std, std)
+        correlation = covariance[np.ix_(index, index)] / np.outer(std, std)
         return float(scaled @ np.linalg.pinv(correlation, hermitian=True) @ scaled)
 
     def _squares(self, fitted: CandidateSet, candidate: Candidate) -> Squares:

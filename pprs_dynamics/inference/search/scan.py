@@ -14,8 +14,13 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
+from pprs_dynamics.inference.search.candidates import (
+    Candidates,
+    CandidateSet,
+    Component,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 

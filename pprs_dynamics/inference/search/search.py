@@ -17,13 +17,15 @@ from itertools import combinations
 
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
+    Candidates,
     CandidateSet,
     Component,
     EffectCandidate,
     UnknownCandidate,
+    joined,
 )
 from pprs_dynamics.inference.search.components import placed
-from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -109,14 +111,32 @@ class Search:
             for fitted in self._inadmissible():
                 self._fit(self._replacements(fitted))
             simplified(self.fits, self.best)
+            self._fit(self._with_same_form())
             if (not self.best.cost < before - LEAST_IMPROVEMENT
                     or (until_nonlinear and self.best.is_nonlinear)):
                 return
 
+    def _with_same_form(self) -> Iterator[Candidates]:
+        """Yield sets with the form error that lowers the cost of the best set.
+
+        What it is made of without one of its effects, and others that cost as little without it.
+        """
+        best, known = self.best, self.best.with_form
+        if known is None:
+            return
+        yield from map(known.without, known.candidates)
+        form = [c for c in known.candidates if c not in best.candidates]
+        names = {c.name for c in form}
+        most = best.plain + self.fits.decisions.rival_margin
+        for fitted in self.fits.sets:
+            if fitted.is_admissible and fitted.plain < most and names.isdisjoint(
+                    c.name for c in fitted.candidates):
+                yield (*fitted.candidates, *form)
+
     def _inadmissible(self) -> list[CandidateSet]:
         """Return inadmissible sets that would be the best: a part of one may be the best."""
         found = [fitted for fitted in self.fits.sets
-                 if fitted.barred and fitted.total < self.best.cost - LEAST_IMPROVEMENT]
+                 if fitted.barred and fitted.total < self.best.cost + LEAST_IMPROVEMENT]
         return sorted(found, key=lambda fitted: fitted.total)[:REPLACEMENTS]
 
     # Moves
@@ -155,6 +175,8 @@ class Search:
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
             found += self.scan.proposals(base, count)
+            if base.with_form is not None:
+                found += self.scan.proposals(base.with_form, count)
             if rank == 0:
                 fast = replace(base, fit=with_fast_noise(self.fits.regression, base.fit))
                 found += self.scan.proposals(fast, REPLACEMENTS)
@@ -264,16 +286,6 @@ def reduced(fitted: CandidateSet, *gone: Component) -> Candidates:
     return tuple(EffectCandidate.of(components) if components else c
                  for c, components in zip(fitted.candidates, kept, strict=True)
                  if components or not c.components)
-
-
-def joined(candidates: Candidates, components: Iterable[Component]) -> Candidates:
-    """Return candidates with more components, each in the candidate of its effect if there is."""
-    for component in components:
-        old = next((c for c in candidates if isinstance(c, EffectCandidate)
-                    and c.effect is component.effect and c.course == component.course), None)
-        candidates = (*(c for c in candidates if c is not old),
-                      EffectCandidate.of([*(old.components if old else ()), component]))
-    return candidates
 
 
 def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidates:

@@ -160,7 +160,7 @@ class ModelTable:
 
         Sets with a nonlinear effect are those of the last search, others those of the first.
         """
-        found = dict(self.exact)
+        found = {key: self._with_forms(row) for key, row in self.exact.items()}
         for fits in dict.fromkeys((self.last, self.first)):
             for fitted in sorted(fits.sets, key=lambda fitted: fitted.cost):
                 if fitted.is_admissible and (self.first is self.last
@@ -168,6 +168,17 @@ class ModelTable:
                     found.setdefault(fitted.row_key, Row(fits, fitted))
         by_cost = sorted(found.values(), key=lambda row: row.cost)
         return tuple({row.fitted.row_key: row for row in reversed(by_cost)}.values())[::-1]
+
+    def _with_forms(self, row: Row) -> Row:
+        """Return an exact row with what a form error explains of it, by linear forces."""
+        fitted, searches = row.fitted, (self.last, self.first)
+        fits = searches[0 if fitted.is_nonlinear else 1]
+        for other in searches:
+            if other.has(fitted.candidates) and (
+                    known := other.evaluate(fitted.candidates).with_form):
+                fits.evaluate(known.candidates)
+        forms = fits.evaluate(fitted.candidates).terms.forms
+        return replace(row, fitted=replace(fitted, terms=replace(fitted.terms, forms=forms)))
 
     @property
     def best(self) -> Row:

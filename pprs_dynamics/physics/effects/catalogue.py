@@ -37,20 +37,16 @@ from pprs_dynamics.errors import ModelError, WorkspaceError
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import names
 
-METHODS = (
-    '__init__', 'from_file', 'to_coefficients', 'from_coefficients', 'columns', 'force',
-    'changed', 'load', 'apply', 'sense', 'measured', 'position_error',
-    'loaded_position_error', 'drive_memory', 'begin', 'initial_memory', 'continued_memory',
-    'check_memory', 'sensor_columns', 'shifts_positions', 'trials', 'alternatives', 'averaged')
-
 
 def guard(effect: type[CatalogueEffect]) -> None:
-    """Let the methods of an effect's class raise EffectError where they fail."""
-    for name in METHODS:
-        method = inspect.getattr_static(effect, name, None)
+    """Let the public methods of an effect's class raise EffectError where they fail."""
+    for name in dir(effect):
+        method = inspect.getattr_static(effect, name)
+        if name.startswith('_') and name != '__init__':
+            continue
         if isinstance(method, (classmethod, staticmethod)):
             setattr(effect, name, type(method)(_guarded(effect, method.__func__)))
-        elif method is not None:
+        elif inspect.isfunction(method):
             setattr(effect, name, _guarded(effect, method))
 
 
@@ -58,7 +54,7 @@ def _guarded(effect: type[CatalogueEffect], method: Callable[..., Any]) -> Calla
     # On purpose: values of a file are wrong, or the mechanism, which is solved when an effect
     # first asks for it, cannot be there.
     passed = ModelError if method.__name__ in (
-        '__init__', 'from_file', 'check_memory') else WorkspaceError
+        '__init__', 'from_file', 'checked', 'check_memory') else WorkspaceError
 
     @wraps(method)
     def call(*arguments: Any, **options: Any) -> Any:

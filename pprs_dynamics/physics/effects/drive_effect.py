@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -253,9 +253,9 @@ class DriveEffect(CatalogueEffect):
         return force
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
-                  turning: Collection[str] | None = None) -> Self:
-        """Build the effect from `{'drive.parameter': value}`."""
+    def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
+                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+        """Return the checked parameters of each drive from `{'drive.parameter': value}`."""
         prefix = f'effects.{cls.name}'
         blocks: dict[str, dict[str, Any]] = {}
         for key, value in values.items():
@@ -264,9 +264,9 @@ class DriveEffect(CatalogueEffect):
         if not blocks or '' in blocks:
             raise ModelError(prefix, dict(values), 'map drives to parameters, e.g. lift_1: '
                              f'{{{names(cls.parameters)}}}')
-        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete,
-                                        None if turning is None else drive in turning)
-                    for drive, block in blocks.items()})
+        return {drive: cls._checked(f'{prefix}.{drive}', block, is_complete,
+                                    None if turning is None else drive in turning)
+                for drive, block in blocks.items()}
 
 
 class MeasurementEffect(DriveEffect):

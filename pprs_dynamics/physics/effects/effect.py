@@ -197,8 +197,8 @@ class Wave(NamedTuple):
 class EffectType(ABCMeta):
     """Type of the effects of the catalogue.
 
-    An effect with the parameters that it has on one robot is a class that no module holds: it is
-    pickled as the function that makes it and that function's arguments, in `made_by`.
+    An effect with the parameters that it has on one robot is a class that no module contains. It
+    is pickled as the function that makes it and that function's arguments, in `made_by`.
     """
 
 
@@ -349,15 +349,27 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     @abstractmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
-                  turning: Collection[str] | None = None) -> Self:
-        """Build the effect from its keys in a model file, or raise ModelError.
+    def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
+                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+        """Return the argument of the class from keys of a model file, or raise ModelError.
 
-        Keys are those below `effects.NAME.`, such as `lift_1.force`. With `complete` false, values
-        may be missing and the result only says that the given ones are right: a node gets the
-        parameters of an effect one by one before it becomes active. Drives in `turning` turn;
-        None allows the bounds of either kind.
+        Parameters
+        ----------
+        values : mapping
+            By key below `effects.NAME.`, such as `lift_1.force`.
+        is_complete : bool
+            False where values may be missing: a node gets them one by one before the effect is
+            active.
+        turning : collection of str, optional
+            Drives that turn; None allows the bounds of either kind.
         """
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], turning: Collection[str] | None = None) -> Self:
+        """Return the effect with values of a model file; see `checked`."""
+        build: Any = cls
+        effect: Self = build(cls.checked(values, turning=turning))
+        return effect
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from math import inf
@@ -19,6 +18,9 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, StructureLoad
 
+# Linear parameters, coefficients and variants of an effect at one place.
+OfPlace = tuple[tuple[Parameter, ...], tuple[Parameter, ...], Sequence[tuple[str, ...]]]
+
 
 class StructureEffect(CatalogueEffect):
     """An effect that is not in the drives.
@@ -29,20 +31,67 @@ class StructureEffect(CatalogueEffect):
         By name of the parameter.
     """
 
+    # Where it acts on a robot: the name of each link or joint, and what a law has to know of it.
+    places: ClassVar[tuple[Any, ...]] = ()
+
     def __init__(self, values: Mapping[str, float]) -> None:
         self.values = dict(values)
+        self.exact = self.to_coefficients(self.values)
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
-                  turning: Collection[str] | None = None) -> Self:
-        """Build the effect from `{parameter: value}`."""
-        return cls(cls._checked(f'effects.{cls.name}', values, complete))
+    @cache
+    def at_places(cls, places: tuple[Any, ...], alike: tuple[tuple[str, ...], ...] = (),
+                  moved: float = inf) -> type[Self]:
+        """Return the effect with its parameters at each place of a robot.
+
+        Parameters
+        ----------
+        places : tuple of tuple
+            A name, and what a law has to know of the place.
+        alike : tuple of tuple of str
+            Names of places at which the effect does the same; the first represents all.
+        moved : float
+            Mass of all that the robot moves [kg].
+        """
+        stand_ins = {name for group in alike for name in group[1:]}
+        each = [cls.of_place(place, place[0] in stand_ins, moved) for place in places]
+        linear, coefficients, variants = (
+            tuple(one for parameters in each for one in parameters[k]) for k in range(3))
+        return type(cls.__name__, (cls,), {
+            'places': places, 'linear': linear, 'coefficients': coefficients,
+            'variants': variants, 'alike': alike, '__module__': cls.__module__,
+            'made_by': (cls.at_places, (places, alike, moved))})
+
+    @classmethod
+    def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
+        """Return linear parameters, coefficients and variants at a place; see `at_places`.
+
+        Parameters
+        ----------
+        place : tuple
+        is_alike : bool
+            Whether an earlier place represents it.
+        moved : float
+            [kg]
+        """
+        return (), (), ()
+
+    @classmethod
+    def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
+                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+        """Return the checked values by name of the parameter."""
+        return cls._checked(f'effects.{cls.name}', values, is_complete)
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:
-        """Return the effect with these coefficients; those not given are zero."""
+        """Return the effect with exactly these coefficients; those not given are zero.
+
+        Parameters may not exist for them: a moment without a mass has no centre.
+        """
         every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
-        return cls(cls.from_coefficients(every))
+        effect = cls(cls.from_coefficients(every))
+        effect.exact = every
+        return effect
 
 
 class BodyEffect(StructureEffect):
@@ -82,11 +131,7 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 
 
 class PassiveJointEffect(StructureEffect):
-    """Friction in the passive joints: a force on top of the rigid body's."""
-
-    @abstractmethod
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the effect's drive forces [N, N m], (N, D)."""
+    """Friction in the passive joints: a force in addition to the rigid body's."""
 
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
@@ -134,51 +179,30 @@ class AddedBody(BodyEffect):
     """
 
     places: ClassVar[tuple[BodyPlace, ...]] = ()
-    has_extent = True
+    has_extent: ClassVar[bool]
     idealised = False
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        super().__init__(values)
-        self._linear = self.to_coefficients(self.values)
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.has_extent = not all(place.is_spread for place in cls.places)
 
     @classmethod
-    @cache
-    def on(cls, places: tuple[BodyPlace, ...],
-           alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
-        """Return the effect with these places on a mechanism that moves so much mass.
+    def of_place(cls, place: BodyPlace, is_alike: bool, moved: float) -> OfPlace:
+        """Return the parameters, coefficients and variants of a body on a link.
 
-        Of links that are alike the first represents all, with a body anywhere; with a mass more
+        Of links that are alike the first represents all, with a body anywhere. With a mass more
         at its own centre each of them is a hypothesis of its own.
         """
-        stand_ins = {name for group in alike for name in group[1:]}
-        linear: list[Parameter] = []
-        coefficients: list[Parameter] = []
-        names: list[tuple[str, ...]] = []
-        for place in places:
-            link, centre, weight, is_spread = place
-            prefix, count = cls.prefix_of(place), 1 if is_spread else None
-            linear += body_parameters(prefix, link, centre, weight)[:count]
-            coefficients += body_coefficients(prefix, link, moved)[:count]
-            mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
-            names += ([(mass,)] if link in stand_ins or is_spread else
-                      [(mass,), (mass, *moment)])
-            if not prefix and not is_spread:
-                inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
-                names += [(mass, *moment, *inertia),
-                          (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
-        return type(cls.__name__, (cls,), {
-            'places': places, 'linear': tuple(linear), 'coefficients': tuple(coefficients),
-            'has_extent': not all(place.is_spread for place in places),
-            'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
-            'made_by': (cls.on, (places, alike, moved))})
-
-    @classmethod
-    def at(cls, coefficients: Mapping[str, float]) -> Self:
-        """Return the effect with these coefficients; those not given are zero."""
-        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
-        effect = cls(cls.from_coefficients(every))
-        effect._linear = every  # a moment without a mass has no centre
-        return effect
+        link, centre, weight, is_spread = place
+        prefix, count = cls.prefix_of(place), 1 if is_spread else None
+        mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
+        variants: list[tuple[str, ...]] = [(mass,)]
+        if not (is_alike or is_spread):
+            variants.append((mass, *moment))
+        if not (prefix or is_spread):
+            variants += [(mass, *moment, *MOMENTS), (mass, *moment, *MOMENTS, *PRODUCTS)]
+        return (body_parameters(prefix, link, centre, weight)[:count],
+                body_coefficients(prefix, link, moved)[:count], variants)
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
@@ -300,9 +324,9 @@ class AddedBody(BodyEffect):
         for place in self.places:
             prefix, link = self.prefix_of(place), place.link
             if place.is_spread:
-                robot = robot.heavier(link, self._linear[f'{prefix}mass'])
+                robot = robot.heavier(link, self.exact[f'{prefix}mass'])
                 continue
-            c = [self._linear[f'{prefix}{name}'] for name in (
+            c = [self.exact[f'{prefix}{name}'] for name in (
                 'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
             if not any(c):
                 continue

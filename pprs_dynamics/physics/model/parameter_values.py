@@ -89,11 +89,14 @@ def added_effects(
             raise _unknown(name, 'effects')
         _check_place(name, values, found, robot, title_of(parameters))
         # A block that is not active is checked all the same, but may still be incomplete.
-        effect = found.bound(robot).from_file(values, name in active, robot.turning)
-        if name in active:
-            if name in of_sensors:
-                effect.is_measurement = True
-            yield effect
+        bound = found.bound(robot)
+        if name not in active:
+            bound.checked(values, is_complete=False, turning=robot.turning)
+            continue
+        effect = bound.from_file(values, robot.turning)
+        if name in of_sensors:
+            effect.is_measurement = True
+        yield effect
     missing = [name for name in active if name not in blocks]
     if missing:
         raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')

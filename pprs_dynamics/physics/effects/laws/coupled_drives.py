@@ -9,15 +9,13 @@ joints, and what rubs at it is felt in all of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import OfPlace, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
 
@@ -56,40 +54,36 @@ class CoupledDrives(StructureEffect):
     is_friction = True
     is_of_one_place = True
     linear = ()
-    maps: ClassVar[Mapping[str, tuple[float, ...]]] = {}
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
-        """Return the effect in the motors of a mechanism that move more than one joint."""
-        return cls if robot is None else _in_motors(tuple(
+        """Return the effect in the motors of a mechanism that move more than one joint.
+
+        A place is a motor with its turns per turn of each drive.
+        """
+        return cls.at_places(tuple(
             (name, ratios) for name, ratios in robot.motors.items()
             if np.count_nonzero(ratios) > 1))
+
+    @classmethod
+    def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
+        """Return the parameters of a motor, and each of them and both."""
+        motor, _ = place
+        viscous, coulomb = names = f'{motor}.viscous', f'{motor}.coulomb'
+        linear = (
+            Parameter(viscous, 'c', 'N m s/rad', f'viscous friction of {motor}', -1e6, 1e6, 0.0,
+                      scale=0.1),
+            Parameter(coulomb, 'F', 'N m', f'dry friction of {motor}', -1e6, 1e6, 0.0, scale=0.1))
+        return linear, linear, ((viscous,), (coulomb,), names)
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         force: Array = np.zeros_like(state.velocity)
         widths = state.reversal.widths(state.velocity.shape[1])
-        for motor, ratios in self.maps.items():
+        for motor, ratios in self.places:
             row = np.array(ratios)
             speed = state.velocity @ row
             friction = (self.values[f'{motor}.viscous'] * speed + self.values[f'{motor}.coulomb']
                         * smooth_sign(speed, np.asarray(np.abs(row) @ widths)))
             force += np.outer(friction, row)
         return force
-
-
-@cache
-def _in_motors(motors: tuple[tuple[str, tuple[float, ...]], ...]) -> type[CoupledDrives]:
-    """Return the effect in motors with their maps, the turns per turn of each drive."""
-    linear: list[Parameter] = []
-    variants: list[tuple[str, ...]] = []
-    for name, _ in motors:
-        viscous, coulomb = f'{name}.viscous', f'{name}.coulomb'
-        linear += [
-            Parameter(viscous, 'c', 'N m s/rad', f'viscous friction of {name}', -1e6, 1e6, 0.0,
-                      scale=0.1),
-            Parameter(coulomb, 'F', 'N m', f'dry friction of {name}', -1e6, 1e6, 0.0, scale=0.1)]
-        variants += [(viscous,), (coulomb,), (viscous, coulomb)]
-    return type('CoupledDrives', (CoupledDrives,), {
-        'linear': tuple(linear), 'variants': tuple(variants), 'maps': dict(motors),
-        '__module__': __name__, 'made_by': (_in_motors, (motors,))})

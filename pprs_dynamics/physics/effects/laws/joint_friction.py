@@ -10,15 +10,14 @@ transmits across its axis, of a ball all of it; by virtual work T' tau at the dr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
-from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
+from pprs_dynamics.physics.effects.structure_effect import OfPlace, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
@@ -63,51 +62,44 @@ class JointFrictionEffect(PassiveJointEffect):
     is_friction = True
     is_of_one_place = True
     linear = ()
-    radii: ClassVar[Mapping[str, float]] = {}
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
-        """Return the effect in the passive joints of a robot."""
-        return cls if robot is None else _in_joints(
-            tuple((one.name, one.radius or RADIUS) for one in robot.passive_joints),
+        """Return the effect in the passive joints of a robot, with the radii of their loads."""
+        return cls.at_places(
+            tuple((joint.name, joint.radius or RADIUS) for joint in robot.passive_joints),
             alike_joints(robot))
+
+    @classmethod
+    def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
+        """Return the parameters of a joint and what is tried of them.
+
+        Of joints that are alike the first represents all, whatever the load; a drive for friction
+        of its own.
+        """
+        joint, _ = place
+        names = viscous, torque, coulomb = (
+            f'{joint}.viscous', f'{joint}.torque', f'{joint}.coulomb')
+        linear = (
+            Parameter(viscous, 'c', 'N m s/rad', f'viscous friction of {joint}', -1e4, 1e4, 0.0,
+                      scale=0.1),
+            Parameter(torque, 'T', 'N m', f'dry friction of {joint}, whatever its load', -1e4,
+                      1e4, 0.0, scale=0.1),
+            Parameter(coulomb, 'mu', '1', f'dry friction of {joint} over its load', -100.0,
+                      100.0, 0.0, scale=0.1))
+        first = () if is_alike else ((viscous,), (torque,), names[:2])
+        return linear, linear, (*first, (coulomb,))
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
+        radii = dict(self.places)
         blocks: dict[str, dict[str, float]] = {}
         for key, value in self.values.items():
             joint, _, name = key.rpartition('.')
             if value:
-                blocks.setdefault(joint, {'radius': self.radii[joint]})[name] = value
+                blocks.setdefault(joint, {'radius': radii[joint]})[name] = value
         force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))
         return force
-
-
-@cache
-def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ...], ...],
-               ) -> type[JointFrictionEffect]:
-    """Return the effect in joints with the radii at which the load rubs [m].
-
-    Of joints that are alike the first represents all, whatever the load; a drive for friction
-    of its own.
-    """
-    linear, variants = [], []
-    stand_ins = {name for group in alike for name in group[1:]}
-    for name, _ in joints:
-        linear += [
-            Parameter(f'{name}.viscous', 'c', 'N m s/rad', f'viscous friction of {name}', -1e4,
-                      1e4, 0.0, scale=0.1),
-            Parameter(f'{name}.torque', 'T', 'N m', f'dry friction of {name}, whatever its load',
-                      -1e4, 1e4, 0.0, scale=0.1),
-            Parameter(f'{name}.coulomb', 'mu', '1', f'dry friction of {name} over its load',
-                      -100.0, 100.0, 0.0, scale=0.1)]
-        if name not in stand_ins:
-            variants += [(f'{name}.viscous',), (f'{name}.torque',),
-                         (f'{name}.viscous', f'{name}.torque')]
-        variants.append((f'{name}.coulomb',))
-    return type('JointFrictionEffect', (JointFrictionEffect,), {
-        'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
-        'alike': alike, '__module__': __name__, 'made_by': (_in_joints, (joints, alike))})
 
 
 class ModelJointFriction(Effect):

@@ -52,5 +52,4 @@ class LinkMass(AddedBody):
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the effect on the links of a robot that have mass."""
-        return cls if robot is None else cls.on(
-            robot.link_places, alike_links(robot), robot.moved_mass)
+        return cls.at_places(robot.link_places, alike_links(robot), robot.moved_mass)

@@ -24,8 +24,8 @@ from pprs_dynamics.physics.mechanism.state import MechanismState
 
 OWN = ('position', 'velocity', 'acceleration', 'load')  # of the drive itself
 OF = ('position', 'velocity')  # of another drive: 'position of lift_1'
-FEWEST, MOST = 1, 400  # intervals between knots
 DEGREE = 3
+LEAST, MOST = 1 + DEGREE, 400 + DEGREE  # coefficients of B-splines
 
 
 class Curve(NamedTuple):
@@ -125,7 +125,7 @@ class MeasuredCurve(DriveEffect):
         super().__init__({drive: dict(values) for drive, values in drives.items()})
         self.curves = {drive: Curve(
             values['variable'], values['from'], values['to'], tuple(values['values']),
-            values['periodic']) for drive, values in drives.items() if 'values' in values}
+            values['periodic']) for drive, values in drives.items()}
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
@@ -155,17 +155,17 @@ class MeasuredCurve(DriveEffect):
     @classmethod
     def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
                  turns: bool | None = None) -> dict[str, Any]:
-        for key in values:
-            if key not in CHECKS:
+        for key, value in values.items():
+            if key not in RULES:
                 raise UnknownNameError('key', f'{prefix}.{key}',
-                                       [f'{prefix}.{known}' for known in CHECKS])
-        given = {'periodic': False, **values}
-        found = {}
-        for key, check in CHECKS.items():
-            if key in given:
-                found[key] = check(f'{prefix}.{key}', given[key])
-            elif complete:
-                raise ModelError(f'{prefix}.{key}', MISSING, 'be given')
+                                       [f'{prefix}.{known}' for known in RULES])
+            is_right, rule = RULES[key]
+            if not is_right(value):
+                raise ModelError(f'{prefix}.{key}', value, rule)
+        found = {'periodic': False, **values}
+        missing = [key for key in RULES if key not in found]
+        if missing and complete:
+            raise ModelError(f'{prefix}.{missing[0]}', MISSING, 'be given')
         if not found.get('from', -math.inf) < found.get('to', math.inf):
             raise ModelError(f'{prefix}.to', found['to'],
                              f'be greater than from, {found["from"]:g}')
@@ -180,40 +180,37 @@ def variable_of(state: MechanismState, drive: str, variable: str) -> Array:
     return values
 
 
-def check_variable(key: str, variable: Any, drives: Sequence[str] = ()) -> str:
+def check_variable(key: str, variable: Any, drives: Sequence[str]) -> str:
     """Return a variable that a curve may have, or raise ModelError."""
-    rule = (f'be one of {", ".join(OWN)}, or {" or ".join(f"{name} of DRIVE" for name in OF)}')
-    if not isinstance(variable, str):
+    is_right, rule = RULES['variable']
+    if not is_right(variable):
         raise ModelError(key, variable, rule)
-    name, of, other = variable.partition(' of ')
-    if name not in (OF if of else OWN) or (of and not other):
-        raise ModelError(key, variable, rule)
-    if of and drives and other not in drives:
+    if (other := variable.partition(' of ')[2]) and other not in drives:
         raise UnknownNameError('drive', other, drives, key)
-    return variable
+    return str(variable)
 
 
-def _values(key: str, values: Any) -> list[float]:
-    least, most = FEWEST + DEGREE, MOST + DEGREE
-    if isinstance(values, str) or not isinstance(values, Sequence) or not (
-            least <= len(values) <= most):
-        raise ModelError(key, values,
-                         f'be a list of {least} to {most} numbers, coefficients of B-splines')
-    return [_number(key, value) for value in values]
+def _is_variable(value: Any) -> bool:
+    name, of, drive = value.partition(' of ') if isinstance(value, str) else ('', '', '')
+    return bool(name in OF and drive) if of else name in OWN
 
 
-def _truth(key: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ModelError(key, value, 'be true or false')
-    return value
+def _is_number(value: Any) -> bool:
+    return (isinstance(value, (int, float)) and not isinstance(value, bool)
+            and math.isfinite(value))
 
 
-def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ModelError(key, value, 'be a finite number')
-    return float(value)
+def _are_values(value: Any) -> bool:
+    return (isinstance(value, (list, tuple)) and LEAST <= len(value) <= MOST
+            and all(map(_is_number, value)))
 
 
-CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    'variable': check_variable, 'from': _number, 'to': _number, 'values': _values,
-    'periodic': _truth}
+# Whether a value of a key is right, and what it must be.
+RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
+    'variable': (_is_variable, f'be one of {", ".join(OWN)}, or '
+                 + ' or '.join(f'{name} of DRIVE' for name in OF)),
+    'from': (_is_number, 'be a finite number'),
+    'to': (_is_number, 'be a finite number'),
+    'values': (_are_values, f'be a list of {LEAST} to {MOST} finite numbers, coefficients of '
+               'B-splines'),
+    'periodic': (lambda value: isinstance(value, bool), 'be true or false')}

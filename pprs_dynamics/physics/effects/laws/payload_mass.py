@@ -49,4 +49,4 @@ class PayloadMass(AddedBody):
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the body at the tool of a robot."""
-        return cls if robot is None else cls.on((robot.tool_place,), (), robot.moved_mass)
+        return cls.at_places((robot.tool_place,), (), robot.moved_mass)
