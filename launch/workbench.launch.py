@@ -36,8 +36,8 @@ def generate_launch_description() -> LaunchDescription:
         pprs = PathJoinSubstitution([FindPackagePrefix('pprs_dynamics'), 'lib/pprs_dynamics/pprs'])
         return [ExecuteProcess(cmd=[
             pprs, 'workbench', '--live', '--no-browser', '--model', model,
-            '--live-topic', given['joint_states'], '--namespace', given['namespace'],
-            '--port', given['port'], '--ros-args',
+            '--live-topic', given['joint_states'], '--port', given['port'],
+            '--ros-args', '-r', ['__ns:=', given['namespace']],
             '-p', ['use_sim_time:=', given['use_sim_time']],
             *(('-p', ['joint_prefix:=', given['prefix']])
               if given['prefix'].perform(context) else ()),

@@ -14,6 +14,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks import mutants
+from benchmarks.naming.entrants.controls import perfect
+from benchmarks.naming.problems import Answer, Named, Truth
+from benchmarks.naming.scoring import FIGURES, Scored, figures, judge
 
 PROJECT = Path(__file__).parents[1]
 MODULES = sorted('.'.join(file.relative_to(PROJECT).with_suffix('').parts)
@@ -49,3 +52,61 @@ def test_a_score_tells_its_options_and_where_its_outcomes_go() -> None:
                            cwd=PROJECT, capture_output=True, text=True, timeout=60, check=True)
     assert '--scheduler' in shown.stdout
     assert 'output/score.jsonl' in shown.stdout
+
+
+# The naming benchmark scores as its protocol says: entrants whose score is known get it.
+
+DRIFT = Truth('p', 'axis', 'single', 'white', 1.0, (Named('spring', ('b',), {
+    'b.stiffness': (3.0, None)}),))
+PAIR = Truth('p', 'axis', 'two', 'white', 1.0, (Named('spring', ('b',)), Named('offset', ('a',))))
+NOTHING = Truth('p', 'axis', 'nothing', 'white', 0.0, ())
+UNKNOWN = Truth('p', 'axis', 'unknown', 'white', 5.0, (Named('bump', ('a',)),))
+FORM = Truth('p', 'axis', 'form', 'white', 5.0, (Named('viscous', ('a',)),))
+
+
+TRUTHS = (DRIFT, PAIR, NOTHING, UNKNOWN, FORM)
+
+
+def scored(answer: object) -> Scored:
+    found = [(truth, answer(truth) if callable(answer) else answer) for truth in TRUTHS]
+    return [(truth, said, judge(truth, said)) for truth, said in found]
+
+
+@pytest.mark.slow
+def test_the_perfect_entrant_gets_everything() -> None:
+    for name, rate in figures(scored(perfect)).items():
+        better = next((up for figure, _, _, up in FIGURES if figure == name), True)
+        assert rate.count == 0 or rate.share == (1.0 if better else 0.0), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('truth', 'answer', 'what', 'right'), [
+    (DRIFT, Answer.of([Named('spring', ('b',))]), 'exact', True),
+    (DRIFT, Answer.of([Named('spring', ('a',))]), 'drives', False),
+    (DRIFT, Answer.of([Named('spring', ('b',)), Named('offset', ('a',))]), 'exact', False),
+    (DRIFT, Answer.of([Named('offset', ('a',)), Named('spring', ('b',))]), 'first', False),
+    (DRIFT, Answer.of([Named('offset', ('b',))]), 'wrong_alone', True),
+    # Doubt that is told is not a wrong answer told for sure.
+    (DRIFT, Answer('ambiguous', ((Named('offset'),), (Named('viscous'),))), 'wrong_alone', False),
+    (DRIFT, Answer('ambiguous', ((Named('offset'),), (Named('spring'),))), 'named', True),
+    (DRIFT, Answer('unknown', ((Named('spring', ('b',)),),)), 'exact', False),
+    (PAIR, Answer.of([Named('offset', ('a',)), Named('spring', ('b',))]), 'exact', True),
+    (PAIR, Answer('ambiguous', ((Named('offset'),), (Named('spring'),))), 'named', False),
+    (PAIR, Answer.of([Named('offset', ('a',))]), 'wrong_alone', False),
+    (NOTHING, Answer('unknown'), 'false_alarm', True),
+    (NOTHING, Answer('none'), 'false_alarm', False),
+    (UNKNOWN, Answer.of([Named('spring', ('a',))]), 'wrong_alone', True),
+    (UNKNOWN, Answer('unknown'), 'unknown', True),
+])
+def test_what_counts(truth: Truth, answer: Answer, what: str, right: bool) -> None:
+    assert getattr(judge(truth, answer), what) is right
+
+
+@pytest.mark.slow
+def test_intervals_are_held_against_the_truth() -> None:
+    def said(value: float, std: float | None) -> Answer:
+        return Answer.of([Named('spring', ('b',), {'b.stiffness': (value, std)})])
+
+    assert judge(DRIFT, said(3.1, 0.1)).covered == (True,)
+    assert judge(DRIFT, said(3.3, 0.1)).covered == (False,)
+    assert judge(DRIFT, said(3.3, None)).covered == ()

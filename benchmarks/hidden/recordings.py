@@ -33,8 +33,6 @@ from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smo
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.simulation.engine import MechanismEngine
-from pprs_dynamics.simulation.engine_loops import ClosedMotion
 from pprs_dynamics.simulation.injected_forms import read_thermometers
 from pprs_dynamics.simulation.injection import (
     CLIMATE,
@@ -139,9 +137,9 @@ class Scene:
 
     def move(self, seed: int) -> None:
         """Let the robot move along the motion of a seed."""
-        self.path, self.platform, motion, closed = _motion(seed, self.duration)
+        self.path, self.platform, motion = _motion(seed, self.duration)
         self.plain = PlainRobot(simulated(
-            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS, closed)
+            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS)
         kept = len(motion) - LEAD
         self.treat = Treatment(np.arange(0, kept, self.block), kept)
         self._refits: dict[str | float, Refit] = {}
@@ -241,13 +239,11 @@ def scene(seed: int, width: float, duration: float = DURATION) -> Scene:
 
 
 @lru_cache(maxsize=2)
-def _motion(seed: int, duration: float,
-            ) -> tuple[RandomMotion, PlatformMotion, JointMotion, ClosedMotion]:
+def _motion(seed: int, duration: float) -> tuple[RandomMotion, PlatformMotion, JointMotion]:
     model = DriveModel.load()
     path = draw_motion(model, seed, duration)
     platform = path.motion(np.arange(-LEAD, round(duration * RATE)) / RATE)
-    motion = driven(model, platform)
-    return path, platform, motion, MechanismEngine(as_mechanism(model)).closed(motion)
+    return path, platform, driven(model, platform)
 
 
 def driven(model: DriveModel, platform: PlatformMotion) -> JointMotion:

@@ -17,8 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from oracles.mujoco_robot import _build
-from oracles.pinocchio_robot import PinocchioRobot
+from oracles.mujoco_robot import trees
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
@@ -136,6 +135,36 @@ class Peer:
         return drives
 
 
+def pinocchio_trees(robot: ThreePprs) -> Any:
+    """Return the platform and three chains slide-lift-rod, each with its bodies."""
+    geometry, masses = robot.geometry, robot.masses
+    model, up = pin.Model(), np.array([0.0, 0.0, 1.0])
+    model.gravity.linear = np.array(robot.gravity)
+
+    def add(joint: int, mass: float, centre: np.ndarray, inertia: np.ndarray) -> None:
+        model.appendBodyToJoint(joint, pin.Inertia(mass, centre, inertia), pin.SE3.Identity())
+
+    xx, yy, zz, xy, xz, yz = masses.inertia
+    platform = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), 'platform')
+    add(platform, masses.platform + masses.payload, np.array(masses.centre),
+        np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    for i, angle in enumerate(geometry.chain_angles):
+        radial = np.array([np.cos(angle), np.sin(angle), 0.0])
+        along = np.array([-np.sin(angle), np.cos(angle), 0.0])
+        slide = model.addJoint(0, pin.JointModelPrismaticUnaligned(along),
+                               pin.SE3(np.eye(3), geometry.base_radius * radial), f'slide_{i}')
+        lift = model.addJoint(slide, pin.JointModelPrismaticUnaligned(up), pin.SE3.Identity(),
+                              f'lift_{i}')
+        rod = model.addJoint(lift, pin.JointModelRevoluteUnaligned(along), pin.SE3.Identity(),
+                             f'rod_{i}')
+        length = geometry.rod_length
+        add(slide, masses.slides[i], np.zeros(3), np.zeros((3, 3)))
+        add(lift, masses.lifts[i], np.zeros(3), np.zeros((3, 3)))
+        add(rod, masses.rods[i], length / 2 * up,
+            masses.rods[i] * length ** 2 / 12 * np.diag([1.0, 1.0, 0.0]))
+    return model
+
+
 class PinocchioPeer(Peer):
     """One `rnea` per sample; in batches one call for all."""
 
@@ -143,7 +172,7 @@ class PinocchioPeer(Peer):
 
     def __init__(self, robot: ThreePprs) -> None:
         super().__init__(robot)
-        self.model = PinocchioRobot(robot).model
+        self.model = pinocchio_trees(robot)
         self.data = self.model.createData()
         self.pool = pin.ModelPool(self.model, 1) if hasattr(pin, 'ModelPool') else None
 
@@ -206,7 +235,7 @@ class MujocoPeer(Peer):
 
     def __init__(self, robot: ThreePprs) -> None:
         super().__init__(robot)
-        spec = _build(robot)
+        spec = trees(robot)
         # Nothing here but the bodies: no contacts, no limits, no sensors to look for.
         spec.option.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONTACT
                                      | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)

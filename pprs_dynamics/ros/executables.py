@@ -12,6 +12,7 @@ import importlib.util
 import itertools
 import signal
 import sys
+from functools import partial
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.bounded_yaml import parse, read_text
@@ -20,26 +21,6 @@ from pprs_dynamics.system.threads import use_one_thread
 # [s] A message asks for the interpreter some five times: with Python's 5 ms each, messages at
 # 200 Hz pile up behind the compiler.
 SWITCH_INTERVAL = 0.0002
-
-
-def feedforward() -> int:
-    """Run `ros2 run pprs_dynamics feedforward`."""
-    return _run('feedforward', 'FeedforwardNode')
-
-
-def monitor() -> int:
-    """Run `ros2 run pprs_dynamics monitor`."""
-    return _run('monitor', 'MonitorNode')
-
-
-def play_trajectory() -> int:
-    """Run `ros2 run pprs_dynamics play_trajectory`."""
-    return _run('play_trajectory', 'PlayTrajectoryNode')
-
-
-def simulated_robot() -> int:
-    """Run `ros2 run pprs_dynamics simulated_robot`."""
-    return _run('simulated_robot', 'SimulatedRobotNode')
 
 
 def trajectory_proxy() -> int:
@@ -107,3 +88,10 @@ def _outside_ros_args(arguments: list[str]) -> list[str]:
         elif not inside:
             outside.append(argument)
     return outside
+
+
+# Entry points of setup.py.
+feedforward = partial(_run, 'feedforward', 'FeedforwardNode')
+monitor = partial(_run, 'monitor', 'MonitorNode')
+play_trajectory = partial(_run, 'play_trajectory', 'PlayTrajectoryNode')
+simulated_robot = partial(_run, 'simulated_robot', 'SimulatedRobotNode')

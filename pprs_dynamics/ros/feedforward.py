@@ -28,12 +28,7 @@ from pprs_dynamics.ros.force_command import (
     parameters_for,
     warn_without_limits,
 )
-from pprs_dynamics.ros.messages.conversions import (
-    NANOSECONDS,
-    RobotNames,
-    efforts,
-    joint_state,
-)
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, efforts, joint_state
 from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (

@@ -22,11 +22,7 @@ from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.ros.messages.conversions import (
-    NANOSECONDS,
-    RobotNames,
-    write_joint_trajectory,
-)
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, write_joint_trajectory
 from pprs_dynamics.ros.messages.conversions import time as time_of
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest

@@ -215,19 +215,16 @@ class LiveNodes(LiveJointStates):
         That running nodes have as well.
     topic, monitor, feedforward : str
         As `LiveJointStates`.
-    namespace : str
-        In which relative names are resolved.
     arguments : sequence of str
-        Of ROS 2, with --ros-args: remappings, joint_prefix, use_sim_time, QoS overrides.
+        Of ROS 2, with --ros-args: namespace, remappings, joint_prefix, use_sim_time, QoS.
     """
 
     def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
-                 feedforward: str = 'feedforward', namespace: str = '',
-                 arguments: Sequence[str] = ()) -> None:
+                 feedforward: str = 'feedforward', arguments: Sequence[str] = ()) -> None:
         context = Context()
         rclpy.init(args=list(arguments), context=context,
                    signal_handler_options=SignalHandlerOptions.NO)
-        super().__init__(model, topic, monitor, feedforward, namespace=namespace, context=context)
+        super().__init__(model, topic, monitor, feedforward, context=context)
         self._served_by = SingleThreadedExecutor(context=context)
         self._served_by.add_node(self)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)

@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import replace
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.residuals.live import ARM_WINDOW, ERROR_SPAN, WINDOW, Compared
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_described
 from pprs_dynamics.ros.diagnosis_worker import ADOPTED, DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.force_command import FRAME
@@ -27,7 +30,6 @@ from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
-from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
@@ -37,7 +39,52 @@ from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED
 from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.simulation.export.exported_robot import TreePose, TreePositions
 from pprs_dynamics.system.plain_text import for_json
+
+
+class AllJoints:
+    """The joints of a model's URDF, whose tree is made in a thread of its own at the first call.
+
+    That takes half a second, and as long as compilers take where nothing is compiled yet.
+    """
+
+    def __init__(self) -> None:
+        self._model: DriveModel | None = None
+        self._made: list[TreePositions | PprsError] = []
+
+    def at(self, model: DriveModel, position: Array) -> tuple[TreePositions, TreePose] | None:
+        """Return the names, and where all is, for positions of the drives, (D,) [m, rad].
+
+        None while the tree is being made.
+
+        Raises
+        ------
+        PprsError
+            As `TreePositions`.
+        """
+        if self._model is not model:
+            self._model, self._made = model, []
+            # Another list for each model: one that comes late is of no use any more.
+            Thread(target=_make, args=(model, position, self._made), name='all_joints',
+                   daemon=True).start()
+        if not self._made:
+            return None
+        if isinstance(tree := self._made[0], PprsError):
+            raise tree
+        return tree, tree.at(position - model.position_error(position[None])[0])
+
+
+def _make(model: DriveModel, position: Array, made: list[TreePositions | PprsError]) -> None:
+    try:
+        # Made anew here: buffers of a model serve one thread at a time.
+        tree = TreePositions(DriveModel.from_parameters(model.values, model.source))
+        with suppress(PprsError):  # it is there to load what is compiled
+            tree.at(position)
+        made.append(tree)
+    except PprsError as error:
+        made.append(error)
+
 
 try:
     from tf2_msgs.msg import TFMessage

@@ -19,26 +19,25 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError, ModelError
 from pprs_dynamics.physics.mechanism.description import (
-    PARAMETERS,
-    Frame,
+    body_at,
     inertial_in,
     principal_inertia,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mjcf import readable_spec
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
+from pprs_dynamics.physics.mechanism.mjcf import matrix_of, readable_spec
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, EngineState, cross
+from pprs_dynamics.simulation.engine_state import TOOL, EngineMotion, EngineState, add_sites
 from pprs_dynamics.simulation.platform import PlatformMechanism
 
-CARRIER = '_added_to_'  # body of what is added to a joint
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
 COMPILER = {'fusestatic': 'false', 'balanceinertia': 'false', 'boundmass': str(LEAST),
             'boundinertia': str(LEAST)}
 # What injected bodies change in MuJoCo's model.
-CHANGED = ('body_mass', 'body_inertia', 'body_ipos', 'body_iquat', 'body_sameframe')
+CHANGED = ('body_mass', 'body_inertia', 'body_ipos', 'body_iquat')
 SLOWEST = 1e-9  # of the width in which friction turns over, below which tanh(x) / x is 1
 AGREEMENT = 1e-6  # of the largest effort
 WIDEST, SPAN = 1.0, 0.3  # [rad, m] of a drive, and the share of it in which both are compared
@@ -79,39 +78,46 @@ class MechanismEngine:
             spec.fuse_static()
         placed = {body.name: structure.links[body.name] for body in spec.bodies[1:]
                   if body.name in structure.links}
-        self._frames = {0: Frame()}
+        # MuJoCo's world is the root of the description, ours its base.
+        hung = {joint.child for joint in structure.description.joints.values()}
+        root = next(name for name in structure.description.links if name not in hung)
+        self.root = structure.links[root][1]
+        self._frames = {0: self.root}
         of_row: dict[int, str] = {}
         for name, (row, frame) in placed.items():
             if row and row not in of_row:
                 of_row[row], self._frames[row] = name, frame
-                self._add_carrier(spec.body(name), row)
+                self._prevent_short_cuts(spec.body(name))
+        add_sites(mujoco, spec, structure, {0: (spec.worldbody, self.root)} | {
+            row: (spec.body(name), self._frames[row]) for row, name in of_row.items()})
         self.model = spec.compile()
         self.links = {0: 0} | {row: int(self.model.body(name).id) for row, name in of_row.items()}
         for name, row in structure.rows.items():  # of several joints on a body
             if row not in self.links:
                 self.links[row] = int(self.model.jnt_bodyid[self.model.joint(name).id])
-        self._added = {row: np.zeros(PARAMETERS) for row in of_row}
-        # MuJoCo's world is the root of the description, ours its base.
-        hung = {joint.child for joint in structure.description.joints.values()}
-        root = next(name for name in structure.description.links if name not in hung)
-        self.root = structure.links[root][1]
         self.state = EngineState(mujoco, self.model, structure, self.root)
         self.data = self.state.data
         self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
         self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
+        self.model.body_sameframe[:] = 0  # MuJoCo's short cut for a centre at the origin
         self._names = {row: name for name, row in structure.rows.items()}
-        self.loops = EngineLoops(self.state, self.links, self._frames)
-        self._last: tuple[JointMotion, ClosedMotion] | None = None
+        hangs = np.eye(self.model.nbody)
+        for number in range(self.model.nbody - 1, 0, -1):
+            hangs[self.model.body_parentid[number]] += hangs[number]
+        a, b = ([self.links[int(row)] for row in rows] for rows in (
+            structure.tables.loop_a, structure.tables.loop_b))
+        # 1 where a closure's force on its second link acts through a body, -1 on its first.
+        self._behind = hangs[:, b] - hangs[:, a]
+        self._nearby: Array | None = None
+        self._last: tuple[JointMotion, EngineMotion] | None = None
         for name, parameters in refused.items():
-            row, frame = structure.links[name]
-            self._carry(row, inertial_in(frame, parameters))
+            self.carry(name, parameters)
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
             if not np.array_equal(parameters, structure.inertial[row]):
                 for name, (of, _) in placed.items():
                     if of == row:
-                        body = self.model.body(name).id
-                        self.model.body_mass[body] = self.model.body_inertia[body] = LEAST
-                self._carry(int(row), parameters - self._added[int(row)])
+                        self._set(int(self.model.body(name).id), np.zeros_like(parameters))
+                self.carry(of_row[int(row)], inertial_in(self._frames[row].inverse, parameters))
         weightless = self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         own = np.zeros(3) if weightless else self.model.opt.gravity
         self.gravity = (self.root.R @ own if robot.gravity == described_gravity(structure)
@@ -121,39 +127,36 @@ class MechanismEngine:
         self.wrench = np.zeros(6)
         mujoco.mj_setConst(self.model, self.data)
         self._require_agreement(model)
-        self._described = self.gravity, self._added.copy(), {
+        self._described = self.gravity, {
             name: getattr(self.model, name).copy() for name in CHANGED}
 
     def reset(self) -> None:
         """Restore bodies, gravity and wrench of the description."""
-        gravity, added, of_model = self._described
-        self.gravity, self._added, self.wrench = gravity, added.copy(), np.zeros(6)
+        self.gravity, of_model = self._described
+        self.wrench = np.zeros(6)
         for name, values in of_model.items():
             getattr(self.model, name)[:] = values
         self.engine.mj_setConst(self.model, self.data)
 
-    def _add_carrier(self, body: Any, row: int) -> None:
-        """Add a body to one of the description's, in the joint's frame, for what is added to it."""
-        frame = self._frames[row].inverse
-        carrier = body.add_body(name=f'{CARRIER}{row}', pos=frame.p, quat=self._quaternion(frame.R))
-        # Off the frame, else MuJoCo takes short cuts that hold for this inertia alone.
-        carrier.mass, carrier.ipos, carrier.iquat = LEAST, (0.1, 0.2, 0.3), (1.0, 0.1, 0.2, 0.3)
-        carrier.inertia, carrier.explicitinertial = (LEAST, 1.1 * LEAST, 1.2 * LEAST), True
+    def _prevent_short_cuts(self, body: Any) -> None:
+        """Add something off a body's frame, else MuJoCo's mass matrix is for its inertia alone."""
+        added = body.add_body(ipos=(0.1, 0.2, 0.3), iquat=(1.0, 0.1, 0.2, 0.3), mass=LEAST,
+                              inertia=(LEAST, 1.1 * LEAST, 1.2 * LEAST))
+        added.explicitinertial = True
 
     def _quaternion(self, R: Array) -> Array:
         quaternion = np.empty(4)
         self.engine.mju_mat2Quat(quaternion, np.ascontiguousarray(R).ravel())
         return quaternion
 
-    def _carry(self, row: int, parameters: Array) -> None:
-        """Add inertial parameters (10,) to what a joint moves, in the joint's frame."""
-        self._added[row] = self._added[row] + parameters
-        body = self.model.body(f'{CARRIER}{row}').id
-        mass, centre, moments, axes = principal_inertia(self._added[row])
-        self.model.body_mass[body], self.model.body_ipos[body] = mass, centre
-        self.model.body_inertia[body] = np.maximum(moments, LEAST)
-        self.model.body_iquat[body] = self._quaternion(axes)
-        self.engine.mj_setConst(self.model, self.data)
+    def _set(self, body: int, parameters: Array) -> None:
+        """Give a body of MuJoCo inertial parameters (10,), in its frame."""
+        model = self.model
+        mass, model.body_ipos[body], moments, axes = principal_inertia(parameters)
+        model.body_mass[body] = max(mass, LEAST)
+        model.body_inertia[body] = np.maximum(moments, LEAST)
+        model.body_iquat[body] = self._quaternion(axes)
+        self.engine.mj_setConst(model, self.data)
 
     def _require_agreement(self, model: DriveModel) -> None:
         """Raise ModelError where MuJoCo's efforts without friction are others than the model's."""
@@ -176,35 +179,32 @@ class MechanismEngine:
     def carry(self, link: str, parameters: Array) -> None:
         """Add inertial parameters (10,) to a link, in the link's frame."""
         row, frame = self.structure.links[link]
-        self._carry(row, inertial_in(frame, parameters))
+        body, model = self.links[row], self.model
+        R = matrix_of(model.body_iquat[body])
+        own = body_at(float(model.body_mass[body]), tuple(model.body_ipos[body]),
+                      R @ np.diag(model.body_inertia[body]) @ R.T)
+        self._set(body, own + inertial_in(self._frames[row].inverse @ frame, parameters))
 
     def shift_tool(self, offset: Array) -> None:
         """Move the centre of mass of what carries the tool by an offset in the tool's axes [m]."""
         row, frame = self.structure.links[self.structure.tool]
-        move = frame.R @ offset
-        for body, axes in ((self.links[row], self._frames[row].R.T),
-                           (self.model.body(f'{CARRIER}{row}').id, np.eye(3))):
-            self.model.body_ipos[body] += axes @ move
-            self.model.body_sameframe[body] = 0  # MuJoCo's shortcut for a centre at the origin
+        self.model.body_ipos[self.links[row]] += self._frames[row].R.T @ frame.R @ offset
         self.engine.mj_setConst(self.model, self.data)
 
-    def home(self) -> None:
-        """Put the engine where the description is assembled."""
-        drives = self.structure.home[None, self.structure.tables.drives]
-        rest = np.zeros_like(drives)
-        self.state.put(self.robot.at(drives, rest, rest).motion, 0)
-        self.loops.forget()
+    def closed(self, motion: JointMotion) -> EngineMotion:
+        """Return the engine's motion along one of the drives.
 
-    def closed(self, motion: JointMotion) -> ClosedMotion:
-        """Return the engine's own motion along one of the drives."""
+        Raises
+        ------
+        WorkspaceError
+            Where the loops do not close.
+        """
         if self._last is None or self._last[0] is not motion:
-            self.home()
-            self._last = motion, self.loops.follow(motion)
+            links = LinkMotion.of(self.structure, motion.position, motion.velocity,
+                                  motion.acceleration, nearby=self._nearby)
+            self._nearby = links.motion.q[-1].copy()
+            self._last = motion, self.state.closed(links)
         return self._last[1]
-
-    def use(self, motion: JointMotion, closed: ClosedMotion) -> None:
-        """Take a motion with closed loops from another engine of the same kinematics."""
-        self._last = motion, closed
 
     def inertia(self) -> Array:
         """Return the inertia of the tree where the engine is, (nv, nv)."""
@@ -212,12 +212,12 @@ class MechanismEngine:
         self.engine.mj_fullM(self.model, self.data, found)
         return found
 
-    def carried(self, closed: ClosedMotion, passive: Array | None = None) -> Carried:
+    def carried(self, closed: EngineMotion, passive: Array | None = None) -> Carried:
         """Return inverse dynamics along a motion.
 
         Parameters
         ----------
-        closed : ClosedMotion
+        closed : EngineMotion
         passive : (N, nv) array, optional
             Efforts of the tree's joints besides, as against friction of passive joints.
         """
@@ -240,7 +240,7 @@ class MechanismEngine:
         if passive is not None:
             needed += passive
         reactions = np.einsum('nlij,nj->nli', closed.reactions, needed)
-        forces -= np.einsum('bl,nli->nbi', self.loops.behind, reactions)
+        forces -= np.einsum('bl,nli->nbi', self._behind, reactions)
         return Carried(needed, np.einsum('nvd,nv->nd', closed.rates, needed), forces, axes,
                        reactions)
 
@@ -248,19 +248,18 @@ class MechanismEngine:
         """Return inverse dynamics along a motion, (N, D); see `carried`."""
         return self.carried(self.closed(motion), passive).efforts
 
-    def tool_velocity(self, closed: ClosedMotion) -> Array:
+    def tool_velocity(self, closed: EngineMotion) -> Array:
         """Return the velocity of the tool's origin in the base, (N, 3) [m/s]."""
         found, jacobian = np.empty((len(closed.position), 3)), np.empty((3, self.model.nv))
         for k in range(len(found)):
             self.data.qpos[:] = closed.position[k]
             self.engine.mj_kinematics(self.model, self.data)
             self.engine.mj_comPos(self.model, self.data)
-            body, at = self._tool()
-            self.engine.mj_jac(self.model, self.data, jacobian, None, at, body)
+            self.engine.mj_jacSite(self.model, self.data, jacobian, None, self.state.sites[TOOL])
             found[k] = self.root.R @ jacobian @ closed.velocity[k]
         return found
 
-    def friction(self, joints: JointFriction, closed: ClosedMotion, carried: Carried) -> Rubbing:
+    def friction(self, joints: JointFriction, closed: EngineMotion, carried: Carried) -> Rubbing:
         """Return the friction of joints along a motion.
 
         Friction is c w + (T + mu r F) tanh(w / width), F the force in the joint without friction:
@@ -279,7 +278,7 @@ class MechanismEngine:
     def across(self, names: Sequence[str], carried: Carried) -> Array:
         """Return the forces across the axes of joints, (N, K, 3)."""
         bodies = [self.links[self.structure.rows[name]] for name in names]
-        return cross(carried.forces[:, bodies],
+        return np.cross(carried.forces[:, bodies],
                      carried.axes[:, [self.state.number(name) for name in names]])
 
     def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
@@ -296,16 +295,10 @@ class MechanismEngine:
                 effort[:, self.state.drives] = 0.0  # a guide's friction loads no other joint
         return rubbing.of_drives(closed)
 
-    def _tool(self) -> tuple[int, Array]:
-        """Return the body that has the tool, and the tool's origin in the engine's world."""
-        row, frame = self.structure.links[self.structure.tool]
-        body, own = self.links[row], self._frames[row].inverse
-        there = Frame(self.data.xmat[body].reshape(3, 3), self.data.xpos[body])
-        return body, there.of_point(own.of_point(frame.p))
-
     def _pushed(self, wrench: Array) -> Array:
         """Let the tool apply a wrench (6,) in the base, and return the joints' efforts, (nv,)."""
-        (body, at), efforts, data = self._tool(), np.zeros(self.model.nv), self.data
+        data, efforts, site = self.data, np.zeros(self.model.nv), self.state.sites[TOOL]
+        body, at = int(self.model.site_bodyid[site]), data.site_xpos[site]
         force, moment = (self.root.R.T @ part for part in (wrench[:3], wrench[3:]))
         self.engine.mj_applyFT(self.model, data, force, moment, at, body, efforts)
         data.xfrc_applied[:] = 0.0
@@ -367,7 +360,7 @@ class Rubbing(NamedTuple):
         return np.einsum('nk,nki,nkiv->nv', self.coefficients(rates), rates, self.rows,
                          optimize=True)
 
-    def of_drives(self, closed: ClosedMotion) -> Array:
+    def of_drives(self, closed: EngineMotion) -> Array:
         """Return the efforts of the drives against it, (N, D)."""
         return np.einsum('nvd,nv->nd', closed.rates, self.efforts(closed.velocity))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.engine import Carried, MechanismEngine
-from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
@@ -160,32 +159,24 @@ class PlainRobot:
         Of the drives.
     rounds : int
         1: friction follows loads without friction, as in the model; more: with friction.
-    closed : ClosedMotion, optional
-        The motion with closed loops, where it is known of a robot of the same kinematics.
+
+    Attributes
+    ----------
+    closed : EngineMotion
+        The motion with closed loops.
+    carried : Carried
+        Inverse dynamics of the bodies.
+    friction, effort : (N, D) arrays
+        Efforts of friction, offset and armature; all efforts of the drives.
     """
 
-    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1,
-                 closed: ClosedMotion | None = None) -> None:
+    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1) -> None:
         self.model, self.motion, self.rounds = model, motion, rounds
         self.engine = MechanismEngine(model)
-        if closed is not None:
-            self.engine.use(motion, closed)
         self.closed = self.engine.closed(motion)
-
-    @cached_property
-    def carried(self) -> Carried:
-        """Inverse dynamics of the bodies."""
-        return self.engine.carried(self.closed)
-
-    @cached_property
-    def friction(self) -> Array:
-        """Efforts of friction, offset and armature, (N, D)."""
-        return own_friction(self.model, self.engine, self.motion, self.rounds)
-
-    @property
-    def effort(self) -> Array:
-        """Efforts of the drives, (N, D)."""
-        return self.carried.efforts + self.friction
+        self.carried = self.engine.carried(self.closed)
+        self.friction = own_friction(model, self.engine, motion, rounds)
+        self.effort = self.carried.efforts + self.friction
 
 
 class Injecting:
@@ -270,9 +261,8 @@ class Injection(Injecting):
         assert plain.motion.time is not None
         self.plain, self.model, self.climate = plain, plain.model, climate
         self.motion, self.time = plain.motion, plain.motion.time
-        self.engine = MechanismEngine(plain.model) if {
-            one.name for one in choices} & CHANGING else plain.engine
-        self.engine.use(plain.motion, plain.closed)
+        self.engine = plain.engine
+        self.engine.reset()  # of what was injected before
         self.windup, self.lead = (np.zeros_like(plain.motion.position) for _ in range(2))
         self.shift = np.zeros(len(self.model.drives))
         self.passive = np.zeros_like(plain.closed.velocity)
@@ -333,7 +323,7 @@ class Injection(Injecting):
             friction = own_friction(self.model, self.engine, replace(
                 self.motion, velocity=self.motion.velocity + wound,
                 acceleration=self.motion.acceleration + np.gradient(wound, self.time, axis=0)))
-        elif self.engine is not self.plain.engine or self.motion is not self.plain.motion:
+        elif self.truths:
             friction = own_friction(self.model, self.engine, self.motion, self.plain.rounds)
         else:
             friction = self.plain.friction
@@ -849,7 +839,6 @@ NAMES = tuple(sorted((name for _, effects in STAGES for name in effects),
                      key=lambda name: name not in FORCES))
 NOT_IN_CATALOGUE = (*UNKNOWN, 'payload_pick_up')
 """Effects that no catalogue effect explains."""
-CHANGING = {*BODIES}  # effects that change MuJoCo's model
 NOT_IN_DRIVES = {*BODIES, 'coupled_drives', 'time_delay', 'effort_filter', 'eccentric_encoder'}
 
 

@@ -25,6 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
@@ -171,16 +172,11 @@ class Plant(Injecting):
             For another name, or an effect that the robot cannot have.
         """
         chosen = self.choices(names, seed, scale)
-        kept = self.engine.data.qpos.copy()  # MuJoCo loses it where bodies change
         self.engine.reset()
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.injected: list[dict[str, Any]] = []
-        try:
-            for choice in chosen:
-                self.injected.append(self.inject_one(
-                    choice, BODIES.get(choice.name, Plant._push)))
-        finally:
-            self.engine.data.qpos[:] = kept
+        for choice in chosen:
+            self.injected.append(self.inject_one(choice, BODIES.get(choice.name, Plant._push)))
 
     def choices(self, names: Sequence[str], seed: int, scale: float) -> list[Choice]:
         """Return the effects of names without injecting them; see `inject`."""
@@ -242,8 +238,8 @@ class Plant(Injecting):
         """
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
-        self.engine.home()
-        self.engine.loops.put(self.position, self.velocity, self._rest)
+        self.engine.closed(JointMotion(self.position[None], self.velocity[None],
+                                       self._rest[None]))
         self.last_acceleration = np.zeros_like(self.position)
         self._held = self._rest
         self._held = self.holding(self.position) - self._offset
@@ -309,7 +305,8 @@ class Plant(Injecting):
         Friction is relative rates per rate of drives (K, 3, D) and a law, which gives friction over
         rate, (K,), of rates (K, 3).
         """
-        closed = self.engine.loops.put(position, velocity, acceleration)
+        closed = self.engine.closed(JointMotion(
+            position[None], velocity[None], acceleration[None]))
         carried = self.engine.carried(closed)
         T = closed.rates[0]
         mass = T.T @ self.engine.inertia() @ T

@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,13 +17,15 @@ import pandas
 import pytest
 
 from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.fleet.engine import cluster, run_each
 from pprs_dynamics.app.fleet.recordings import (
+    COLUMNS,
     ManifestError,
     SurveyedRecording,
     find_recordings,
     read_manifest,
+    write_rows,
 )
-from pprs_dynamics.app.fleet.store import COLUMNS, write_rows
 from pprs_dynamics.app.fleet.trend import find_steps, fleet_trends
 from pprs_dynamics.errors import UnreadableFileError
 
@@ -151,13 +155,28 @@ def test_a_survey_writes_documented_columns_and_does_nothing_twice(
     assert '0 done, 4 done before' in ' '.join(capsys.readouterr().out.split())
     rows = pandas.read_parquet(store)
     text = (Path(__file__).parents[2] / 'docs' / 'fleets.md').read_text()
-    assert [*rows.columns] == [name for name, *_ in COLUMNS] == re.findall(
+    assert [*rows.columns] == [*COLUMNS] == re.findall(
         r'^\| `(\w+)` \|', text, re.MULTILINE)
     found = rows[rows.effect == 'coulomb_friction']
     assert len(found) == 3
     assert (abs(found.value - 4.0) < 4 * found['std']).all()
     assert {*rows.robot} == {'robot_1'}
     assert rows.error.notna().sum() == 1
+
+
+def work(item: str) -> str:
+    if item == 'kills':
+        os.kill(os.getpid(), signal.SIGKILL)
+    return item
+
+
+def test_of_a_worker_that_is_killed_only_the_item_that_kills_it_is_lost() -> None:
+    pytest.importorskip('distributed')
+    with cluster(1) as client:
+        found = {item: (done, error) for item, done, error in run_each(
+            client, work, ['first', 'kills', 'last'])}
+    assert 'KilledWorker' in found.pop('kills')[1]
+    assert found == {name: (name, None) for name in ('first', 'last')}
 
 
 def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(

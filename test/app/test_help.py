@@ -43,32 +43,6 @@ def test_help_ends_with_an_example_that_the_command_takes(
     assert _parser(example[1:]).parse_args(example[1:]).command == command
 
 
-@pytest.mark.parametrize(('arguments', 'words'), [
-    (['comapre', 'x.csv'], 'did you mean compare?'),
-    (['compare', 'x.csv', '--reprot', 'x.html'], 'did you mean --report?'),
-    (['simulate', '--output', 'x.csv', '--effect', 'stribek'], 'did you mean stribeck_friction?'),
-    (['adopt', 'stribeck_friction:slide1', 'x.csv', '--output', 'y.yaml'],
-     'did you mean slide_1?'),
-    (['compare', 'rum.mcap'], 'did you mean run.mcap?'),
-    (['info', 'run.mcap', '--model', 'robot.yaml'], 'did you mean masses.payload?'),
-    (['info', 'run.mcap', '--model', 'arm.urdf'], '`pprs init arm.urdf RECORDING'),
-])
-def test_what_was_meant_is_named(
-    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / 'run.mcap').write_bytes(b'')
-    (tmp_path / 'arm.urdf').write_text('<robot name="arm"/>')
-    (tmp_path / 'robot.yaml').write_text('/**:\n  ros__parameters:\n    masses: {paylod: 1.0}\n')
-    try:
-        status = main(arguments)
-    except SystemExit as ended:
-        status = int(str(ended.code))
-    assert status == 2
-    assert words in said(capsys)
-
-
 def test_without_a_model_a_recording_of_another_robot_names_init_and_demo(
     tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import argparse
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +16,7 @@ import pytest
 from made_up_recordings import judged, measured
 from pprs_command import pprs
 
+from pprs_dynamics.app.commands.arguments import number
 from pprs_dynamics.app.commands.pprs import COMMANDS
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import write_recording
@@ -39,8 +42,6 @@ MISTAKES = {
     'compare silent.csv': 'silent.csv: no effort of any drive',
     'diagnose run.csv --adopt-all': '--adopt-all: no --output FILE is given',
     'diagnose run.csv --output x.yaml': '--output: it is given without --adopt-all',
-    'diagnose run.csv --adopt-all --output x.yaml --refit --reference':
-        '--refit: it is given with --reference',
     'diagnose run.csv --model nowhere.yaml': 'nowhere.yaml: no such file',
     'export --output x.txt --model model.yaml': ENDS,
     'fit nowhere.csv --output x.yaml': 'nowhere.csv: No such file',
@@ -61,6 +62,27 @@ MISTAKES = {
     'workbench --no-browser --host 0.0.0.0': 'one address',
     'workbench --no-browser --port 99999': '--port',
     'workbench --no-browser run.csv run.csv': 'may be given once',
+    # An output that is an input, by another name or by a link.
+    'compare run.csv --json twice.json --report soft.html': 'must be',
+    'fit run.csv --output model.yaml --model model.yaml': 'must be',
+    'fit run.csv --output soft.yaml --model model.yaml': 'must be',
+    'adopt backlash run.csv --output ./model.yaml --model soft.yaml': 'must be',
+    'next-experiment run.csv --output hard.csv': 'must be',
+    'simulate --path run.csv --output hard.csv': 'must be',
+    'survey bag --output bag': 'must be',
+    # A recording that exists is never replaced.
+    'simulate --duration 2 --output run.csv': 'run.csv: it exists already',
+    'simulate --duration 2 --output link.csv': 'link.csv: it exists already',
+    'compare run.csv --mcap old.mcap': 'old.mcap: it exists already',
+    'next-experiment --purpose commission --output run.csv': 'run.csv: it exists already',
+    # What was meant.
+    'comapre x.csv': 'did you mean compare?',
+    'compare x.csv --reprot x.html': 'did you mean --report?',
+    'simulate --output x.csv --effect stribek': 'did you mean stribeck_friction?',
+    'adopt stribeck_friction:slide1 x.csv --output y.yaml': 'did you mean slide_1?',
+    'compare odl.mcap': 'did you mean old.mcap?',
+    'info old.mcap --model wrong.yaml': 'did you mean masses.payload?',
+    'info old.mcap --model arm.urdf': '`pprs init arm.urdf RECORDING',
 }
 
 
@@ -78,19 +100,39 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(CONFIG / 'paper.yaml', folder / 'model.yaml')
     shutil.copy(CONFIG / 'single_axis.yaml', folder / 'axis.yaml')
     shutil.copy(CONFIG / 'single_axis.urdf', folder / 'single_axis.urdf')
+    write_recording(folder / 'bag', judged(measured(200)))
+    for link, target in (('soft.yaml', 'model.yaml'), ('soft.html', 'run.csv'),
+                         ('link.csv', 'run.csv')):
+        (folder / link).symlink_to(target)
+    os.link(folder / 'run.csv', folder / 'hard.csv')
+    (folder / 'old.mcap').write_bytes(b'a measurement')
+    (folder / 'arm.urdf').write_text('<robot name="arm"/>')
+    (folder / 'wrong.yaml').write_text('/**:\n  ros__parameters:\n    masses: {paylod: 1.0}\n')
     return folder
 
 
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()}
+
+
 def test_every_command_is_tried() -> None:
-    assert {words.split()[0] for words in MISTAKES} == set(COMMANDS)
+    assert set(COMMANDS) <= {words.split()[0] for words in MISTAKES}
 
 
 @pytest.mark.parametrize('words', MISTAKES)
 def test_a_mistake_is_one_line_and_status_2(given: Path, words: str) -> None:
-    before = {path: path.read_bytes() for path in given.iterdir()}
+    before = contents(given)
     done = pprs(*words.split(), cwd=given)
     assert done.returncode == 2, done.stdout
     assert MISTAKES[words] in done.stderr
     assert done.stderr.startswith('pprs')
     assert len(done.stderr.strip().splitlines()) == 1
-    assert {path: path.read_bytes() for path in given.iterdir()} == before
+    assert contents(given) == before
+
+
+def test_numbers_of_the_command_line_are_within_their_bounds() -> None:
+    read = number(0.0, 2.0, 'N', above=True)
+    assert read('1e-3') == 1e-3
+    for text in ('0', '-1', '2.1', 'nan', 'inf', '1_0', '', '\uff11'):
+        with pytest.raises(argparse.ArgumentTypeError, match='greater than 0 and at most 2 N'):
+            read(text)

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ FIRST_PAINT = 500.0  # [ms]
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp('pages')
     return {name: page.write(folder / f'{name}.html')
-            for name, page in made_up_pages(folder).items()}
+            for name, page in made_up_pages().items()}
 
 
 @pytest.fixture(scope='module')
@@ -122,3 +124,31 @@ def test_the_next_command_is_copied_with_the_real_names(see: Any) -> None:
     assert seen.tab.evaluate('navigator.clipboard.readText()') == (
         "pprs adopt coulomb_friction 'my run.mcap' --validate other.mcap --model MODEL.yaml "
         '--output with_coulomb_friction.yaml')
+
+
+# The pages' JavaScript modules by themselves, in Node's own test runner.
+
+ROOT = Path(__file__).parents[2]
+MODULE_FOLDER = ROOT / 'pprs_dynamics' / 'app' / 'browser'
+NODE = shutil.which('node')
+needs_node = pytest.mark.skipif(NODE is None, reason='no node on PATH to run JavaScript with')
+
+
+def node(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([NODE or 'node', *map(str, arguments)], capture_output=True, text=True,
+                          timeout=120)
+
+
+@needs_node
+@pytest.mark.parametrize('name', ['curve_files', 'format', 'client', 'views'])
+def test_modules_do_what_they_say(name: str) -> None:
+    done = node('--test', ROOT / 'test' / 'browser' / f'{name}.test.mjs')
+    assert done.returncode == 0, done.stdout
+    assert 'fail 0\n' in done.stdout
+    assert 'pass 0\n' not in done.stdout
+
+
+@needs_node
+@pytest.mark.parametrize('file', sorted(one.name for one in MODULE_FOLDER.glob('*js')))
+def test_each_script_is_one(file: str) -> None:
+    assert node('--check', MODULE_FOLDER / file).returncode == 0

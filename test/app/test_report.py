@@ -11,11 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from model_recordings import record, with_effects
 from pprs_command import pprs
+from rosbags.highlevel import AnyReader
 
+from pprs_dynamics import DriveModel
+from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.report.charts import thinned
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
+from pprs_dynamics.physics.model.model_writer import write_model
 
 
 @pytest.fixture(scope='module')
@@ -85,3 +90,63 @@ def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
     assert len(times) == len(one) == len(other) <= 3000
     assert one.max() == 3.0
     assert other.min() == -4.0
+
+
+# compare --mcap and --beside: files for PlotJuggler and Foxglove; two models on one recording.
+
+RATE, OFFSET = 100.0, 0.7  # [Hz, N]
+
+
+@pytest.fixture(scope='module')
+def two_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a two_models with a recording whose first slide needs more, and another model."""
+    where = tmp_path_factory.mktemp('bag')
+    better = with_effects(DriveModel.load(), {'effort_offset': {'slide_1.force': OFFSET}})
+    write_recording(where / 'run.csv', record(better, 0.05, 1, time=np.arange(0, 8.0, 1 / RATE)))
+    write_model(where / 'better.yaml', better.values)
+    return where
+
+
+def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
+    two_models: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(two_models)
+    assert main(['compare', 'run.csv', '--mcap', 'out.mcap', '--json', 'said.json']) == 0
+    found: dict[str, list[tuple[int, np.ndarray]]] = {}
+    said = []
+    with AnyReader([two_models / 'out.mcap']) as reader:
+        for connection, _, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            if connection.topic == '/findings':
+                said.append(message.msg)
+                continue
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            found.setdefault(connection.topic, []).append((stamp, message.effort))
+    content = json.loads((two_models / 'said.json').read_text())
+    assert said == [content['verdict'], *(each['text'] for each in content['where'])]
+    assert len(said) > 1
+    parts = {topic for topic in found if topic.startswith('/parts/')}
+    assert parts == {'/parts/rigid_body', '/parts/active_friction', '/parts/passive_friction'}
+    stamps = [stamp for stamp, _ in found['/measured']]
+    assert all(stamp % 10_000_000 == 0 for stamp in stamps)  # those of the recording
+    arrays = {topic: np.array([effort for _, effort in rows]) for topic, rows in found.items()}
+    assert all([stamp for stamp, _ in rows] == stamps for rows in found.values())
+    np.testing.assert_allclose(arrays['/residual'], arrays['/measured'] - arrays['/model'])
+    np.testing.assert_allclose(arrays['/model'], sum(arrays[topic] for topic in parts), atol=1e-9)
+    assert arrays['/residual'][:, 0].mean() == pytest.approx(OFFSET, abs=0.02)
+
+
+def test_errors_of_two_models_on_one_recording(
+    two_models: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(two_models)
+    beside = 'better.yaml'
+    assert main(['compare', 'run.csv', '--beside', beside, '--json', 'both.json',
+                 '--report', 'both.html']) == 0
+    content = json.loads((two_models / 'both.json').read_text())
+    assert content['beside']['name'] == beside
+    before, after = (one['drives']['slide_1']['rms'] for one in (content, content['beside']))
+    assert before == pytest.approx(OFFSET, rel=0.05)
+    assert after < 0.1
+    assert beside in capsys.readouterr().out
+    assert beside in (two_models / 'both.html').read_text()

@@ -12,20 +12,18 @@ import subprocess
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
+from model_recordings import record, with_effects
 from pprs_command import pprs
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report import terminal
 from pprs_dynamics.app.report.terminal import as_text, shell_command, stacked, verdict_panel
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 
-RATE, DURATION = 200.0, 8.0
 # A drive force that the model lacks, so that commands have something to say.
 VISCOUS = 12.0  # [N s/m]
 UNDECODABLE = os.fsdecode(b'bad\xff[m].csv')
@@ -35,15 +33,8 @@ UNDECODABLE = os.fsdecode(b'bad\xff[m].csv')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the recording run.csv."""
     folder = tmp_path_factory.mktemp('terminal')
-    model = DriveModel.load()
-    motion = Excitation(DURATION).motion(np.arange(0.0, DURATION, 1 / RATE))
-    forces = model.drive_forces(motion)
-    q, q_dot = forces.mechanism.position, forces.mechanism.velocity
-    noise = np.random.default_rng(0).normal(0, 0.05, q.shape)
-    effort = forces.total + noise
-    effort[:, 1] += VISCOUS * q_dot[:, 1]
-    write_recording(folder / 'run.csv', Recording.from_arrays(
-        'run', motion.time, np.round(q, 6), q_dot, effort))
+    robot = with_effects(DriveModel.load(), {'viscous_friction': {'slide_2.coefficient': VISCOUS}})
+    write_recording(folder / 'run.csv', record(robot, 0.05))
     (folder / 'model.yaml').write_text(format_model(default_parameters()), encoding='utf-8')
     return folder
 

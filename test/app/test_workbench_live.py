@@ -85,7 +85,7 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states', 1)
         stack.callback(replay.close)
         bench = stack.enter_context(workbench(
-            '--live', '--model', model, '--namespace', '/left', folder=tmp_path))
+            '--live', '--model', model, '--ros-args', '-r', '__ns:=/left', folder=tmp_path))
         bench.enter()
         assert bench.screen()['units']['turn']['effort'] == 'N m'
 

@@ -136,6 +136,22 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.tab.wait_for_function("!document.querySelector('#share-list li')")
 
 
+def test_a_file_that_is_dropped_is_opened_and_one_that_is_none_is_a_sentence(
+    page: Page, folder: Path,
+) -> None:
+    names = [one['name'] for one in page.settled()['recordings']]
+    dropped = write_hidden(folder / 'dropped.csv', 3, 8.0)
+    drop = '''([name, text]) => { const files = new DataTransfer();
+        files.items.add(new File([text], name));
+        document.body.dispatchEvent(
+            new DragEvent('drop', {bubbles: true, dataTransfer: files})); }'''
+    page.tab.evaluate(drop, ['words.csv', 'Dear robot'])
+    page.tab.locator('#message', has_text='words.csv').wait_for()
+    page.tab.evaluate(drop, [dropped.name, dropped.read_text()])
+    page.tab.wait_for_function(f'bench.state.recordings.length === {len(names) + 1}')
+    assert [one['name'] for one in page.settled()['recordings']] == [*names, 'dropped.csv']
+
+
 def test_all_is_done_by_keyboard(page: Page) -> None:
     page.tab.keyboard.press('/')
     page.tab.keyboard.type('payload mass')

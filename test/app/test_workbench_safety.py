@@ -18,8 +18,7 @@ from ros_processes import executable
 from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
-from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
-from pprs_dynamics.app.workbench.server.offered import NotOfferedError, Offered
+from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, NotOfferedError, Offered
 
 AT_ONCE = struct.pack('ii', 1, 0)  # closes with a reset
 SECRET = 'no business of a browser'

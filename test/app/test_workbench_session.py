@@ -19,10 +19,8 @@ from workbench_bench import HIDDEN, write_hidden
 from pprs_dynamics import DriveModel, compare
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench.background import Cancelled, Job
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import run_in_process
-from pprs_dynamics.app.workbench.session_file import SavedSession
+from pprs_dynamics.app.workbench.jobs import Cancelled, Job, run_in_process
+from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.ledger import read_steps
@@ -264,45 +262,3 @@ def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> Non
     assert not session.ticks.redoes
 
 
-class TestASavedSession:
-    def test_goes_on_where_it_was_left(self, recording: Path, tmp_path: Path) -> None:
-        session = Session.open([recording])
-        session.ticks.tick('payload_mass')
-        session.ticks.settle()
-        assert session.jobs.adopt('payload_mass', force=True).result(120).adopted
-        session.ticks.tick('coulomb_friction', ['lift_2'])
-        session.ticks.choose('coulomb_friction', 'lift_2.force', 0.7)
-        shown = session.ticks.settle()
-        session.save(tmp_path / 'session.json')
-        again = Session.load(tmp_path / 'session.json')
-        assert again.ticks.model.values == session.ticks.model.values
-        assert steps_of(again) == steps_of(session)
-        assert again.ticks.undoes == ''  # nothing was done in this one
-        after = again.ticks.settle()
-        assert set(after.ticks) == {'coulomb_friction'}
-        assert after.estimates['coulomb_friction']['lift_2.force'].value == 0.7
-        assert after.departure == pytest.approx(shown.departure, rel=1e-6)
-        np.testing.assert_allclose(again.ticks.view.residual, session.ticks.view.residual,
-                                   atol=1e-9)
-
-    @pytest.mark.parametrize(('change', 'said'), [
-        (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
-        (lambda run, file: run.unlink(), 'run.csv: No such file'),
-        (lambda run, file: file.write_text(file.read_text().replace(str(run), '/dev/zero')),
-         '/dev/zero'),
-        (lambda run, file: file.write_text('{'), 'session.json: '),
-        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*depth'),
-        (lambda run, file: file.write_text('[]'), 'is no session'),
-        (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
-         'is no session')])
-    def test_is_refused_where_it_is_none_any_more(
-        self, session: Session, recording: Path, tmp_path: Path, change: Any, said: str,
-    ) -> None:
-        run, file = tmp_path / 'run.csv', tmp_path / 'session.json'
-        run.write_bytes(recording.read_bytes())
-        session.save(file)
-        file.write_text(file.read_text().replace(str(recording), str(run)))
-        assert SavedSession.read(file).ticks == ()
-        change(run, file)
-        with pytest.raises(PprsError, match=said):
-            SavedSession.read(file)

@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from documents import FENCE, PROJECT, code, pages, text_of
+from documents import FENCE, PROJECT, anchors, code, links, pages, text_of
 
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser
 from pprs_dynamics.inference.search.decisions import OUTSIDE_COST
@@ -201,9 +201,55 @@ def test_codes_of_the_status_are_those_of_its_schema_and_of_the_page() -> None:
     assert [code for code in CODES if not re.search(rf'^\|[^|]*`{code}`', page, re.M)] == []
 
 
+def test_tests_that_protect_against_a_risk_are_there() -> None:
+    text = (PROJECT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    named = re.findall(r'`(test/[\w/]*test_\w+\.py)(?:::(\w+))?`', text)
+    assert len(named) > 50
+    for file, name in named:
+        assert f'def {name or "test_"}' in (PROJECT / file).read_text(encoding='utf-8'), name
+
+
 def test_the_page_lists_at_most_twelve_rules_outside_the_cost() -> None:
     import_module('pprs_dynamics.inference.adoption.adopt')  # lists all rules
     text = (PROJECT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')
     assert 0 < len(OUTSIDE_COST) <= 12
     for name, rule in OUTSIDE_COST.items():
         assert f'| {rule} | `{name}` |' in text
+
+
+# Links of README and docs lead somewhere: to files that exist and headings that stand there.
+
+def broken(page: Path, text: str) -> list[str]:
+    """Return the links of a page's text that lead nowhere."""
+    wrong = []
+    for target in links(text):
+        path, _, anchor = target.partition('#')
+        file = (page.parent / path).resolve() if path else page
+        known = anchors(text if file == page else text_of(file)) if (
+            anchor and file.is_file()) else set()
+        if not file.exists() or PROJECT not in file.parents or (anchor and anchor not in known):
+            wrong.append(target)
+    return wrong
+
+
+@pytest.mark.parametrize('page', pages(), ids=lambda page: str(page.relative_to(PROJECT)))
+def test_every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
+    assert broken(page, text_of(page)) == []
+
+
+def test_every_page_is_linked_from_another() -> None:
+    reached = {(page.parent / target.partition('#')[0]).resolve()
+               for page in pages() for target in links(text_of(page)) if target[0] != '#'}
+    # These two include README and CONTRIBUTING for the site.
+    entry = {PROJECT / 'README.md', PROJECT / 'docs' / 'index.md',
+             PROJECT / 'docs' / 'CONTRIBUTING.md'}
+    texts = {page for page in pages() if page.stem.endswith('_text')}
+    lonely = {*pages()} - reached - entry - texts
+    assert {str(page.relative_to(PROJECT)) for page in lonely} == set()
+
+
+@pytest.mark.parametrize('link', ['nowhere.md', 'docs/nodes.md#no-such-heading', '#no-heading',
+                                  '../outside.md', 'docs/images/no.png'])
+def test_a_link_that_leads_nowhere_is_found(link: str) -> None:
+    text = f'# Heading\n[good](docs/nodes.md) [good](#heading) ![bad]({link}) `[code](x.md)`'
+    assert broken(PROJECT / 'README.md', text) == [link]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from model_recordings import record
 from pprs_command import pprs
 from single_axis import axis, axis_recording
 
@@ -145,11 +146,10 @@ def test_force_overrides_and_is_recorded(files: Files) -> None:
 
 def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of a robot that differs from it."""
-    motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.005))
-    forces = DriveModel.from_parameters({**default_parameters(), **recorded}).drive_forces(motion)
-    noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
-    return DriveModel.from_parameters({**default_parameters(), **values}), Recording.from_arrays(
-        'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
+    model, robot = (DriveModel.from_parameters({**default_parameters(), **changes})
+                    for changes in (values, recorded))
+    return model, record(robot, NOISE, 8, Excitation(DURATION, seed=5).motion,
+                         np.arange(0, DURATION, 0.005))
 
 
 def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
@@ -205,10 +205,7 @@ def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence(text: str, n
     up_and_down = np.tile([0.0, 0.0, 0.5], (2000, 1))
     up_and_down[:, 2] += 0.04 * np.sin(2 * np.pi * time / 4) * np.sin(np.pi * time / 8) ** 2
     motion = PlatformMotion.from_poses(time, up_and_down, np.tile([0.0, 0, 0, 1], (2000, 1)))
-    forces = model.drive_forces(motion)
-    noise = 0.05 * np.random.default_rng(1).normal(size=(2000, 6))
-    recording = Recording.from_arrays('heave', time, forces.mechanism.position, None,
-                                      forces.total + noise)
+    recording = record(model, 0.05, motion=lambda _: motion, time=time)
     answer = adopt(model, EffectRequest.of(text), [recording])
     assert not answer.adopted
     assert f'{named} hardly moved in the recordings' in answer.reason

@@ -13,6 +13,7 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion
@@ -87,21 +88,11 @@ def test_the_base_is_fitted_again_beside_an_effect_that_it_held(tmp_path: Path) 
         'friction.coulomb': tuple(1.3 * np.array(arm.FRICTION['friction.coulomb']))})
     runs = [arm.record(real, arm.motion(10.0, seed=seed), NOISE, seed) for seed in (0, 1)]
     again = fit_base(held, runs[:1], runs[1:])
-    assert again.ratio < 1, again.change
     assert again.model.values['friction.coulomb'] == pytest.approx(
         arm.FRICTION['friction.coulomb'], rel=0.05)
     # What was adopted stays as it was.
     for key in load:
         assert again.model.values[key] == held.values[key]
-
-
-def test_a_base_that_predicts_worse_is_not_taken(tmp_path: Path) -> None:
-    real, other = arm.real_arm(tmp_path), heavier(tmp_path)
-    run, validate = (arm.record(one, arm.motion(10.0, seed=seed), NOISE, seed)
-                     for one, seed in ((other, 0), (real, 1)))
-    again = fit_base(real, [run], [validate])
-    assert again.ratio > 1
-    assert 'must fall' in again.change
 
 
 def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:
@@ -197,8 +188,7 @@ def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
 ) -> None:
     monkeypatch.setenv('COLUMNS', '400')
     healthy, described = arm.real_arm(tmp_path), DriveModel.load(tmp_path / 'arm.yaml')
-    loaded = DriveModel.from_parameters({**healthy.values, 'effects.active': ['payload_mass'],
-                          'effects.payload_mass.mass': 1.5}, healthy.source)
+    loaded = with_effects(healthy, {'payload_mass': {'mass': 1.5}})
     for name, real, seed in (('healthy', healthy, 0), ('loaded', loaded, 1)):
         write_recording(tmp_path / f'{name}.csv', arm.record(real, arm.motion(20.0, seed=seed),
                                                              NOISE, seed))

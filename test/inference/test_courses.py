@@ -11,6 +11,7 @@ from pathlib import Path
 import made_up_arm
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from scipy.signal import butter, lfilter
 
 from pprs_dynamics import DriveModel, Recording
@@ -33,9 +34,7 @@ def recorded(effort: np.ndarray) -> Recording:
 
 
 def loaded(mass: float) -> np.ndarray:
-    heavier = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['payload_mass'],
-                           'effects.payload_mass.mass': mass})
-    return heavier.drive_forces(MOTION).total
+    return with_effects(MODEL, {'payload_mass': {'mass': mass}}).drive_forces(MOTION).total
 
 
 def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment() -> None:

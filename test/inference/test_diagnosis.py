@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_recordings import TIME, record
+from model_recordings import TIME, record, with_effects
 
 from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel
@@ -39,9 +39,8 @@ def design() -> Design:
 
 def change(design: Design, effect: str, values: dict[str, float], drive: str = '') -> np.ndarray:
     """Return what an effect changes in the model's treated effort on the same recording."""
-    prefix = f'effects.{effect}.{drive}.' if drive else f'effects.{effect}.'
-    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': [effect],
-                         **{prefix + key: value for key, value in values.items()}})
+    model = with_effects(MODEL, {effect: {
+        f'{drive}.{key}' if drive else key: value for key, value in values.items()}})
     with_it, _ = measure_residuals(model, [record(MODEL)])
     return with_it.model - design.residuals.model
 
@@ -131,8 +130,7 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
 
 
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['base_tilt'],
-                        'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
+    true = with_effects(MODEL, {'base_tilt': {'x': 0.045, 'y': -0.048}})
     up_and_down = np.zeros((6, JointSeries.size(3)))
     up_and_down[2] = 0.03, -0.02, 0.04
     series = JointSeries(up_and_down, np.array((*HOME, 0.0, 0.0, 0.0)), TIME[-1], 3)
@@ -147,9 +145,8 @@ def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:
     tau, force = 1.0, 1.5
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['friction_drift'], **{
-        f'effects.friction_drift.{d}.{key}': value for d in DRIVES
-        for key, value in (('force', force), ('time', tau))}})
+    true = with_effects(MODEL, {'friction_drift': {
+        f'{d}.{key}': value for d in DRIVES for key, value in (('force', force), ('time', tau))}})
     recording = record(true)
     design = Design.of(MODEL, [recording])
     # A window of smoothing is dropped before the first sample: the clock has run by then.
@@ -189,11 +186,9 @@ def test_what_no_effect_explains_is_told_with_its_variable(name: str, variable: 
 
 
 def test_a_drive_that_reverses_in_another_width_hides_no_friction() -> None:
-    effect = 'effects.stribeck_friction.slide_1.'
-    true = DriveModel.from_parameters({
-        **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0),
-        'effects.active': ['stribeck_friction'],
-        effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
+    true = with_effects(DriveModel.from_parameters({
+        **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0)}), {
+        'stribeck_friction': {'slide_1.force': 0.8, 'slide_1.velocity': 0.02}})
     recording = record(true, noise=0.05)
     other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2).motion)
     found = diagnose(MODEL, [recording], [other])
@@ -209,10 +204,9 @@ def test_a_drive_that_reverses_in_another_width_hides_no_friction() -> None:
 
 @pytest.mark.filterwarnings('error')
 def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -> None:
-    late = DriveModel.from_parameters(
-        {**MODEL.values, 'effects.active': ['time_delay', 'viscous_friction'],
-                        **{f'effects.time_delay.{drive}.delay': 0.008 for drive in DRIVES},
-                        'effects.viscous_friction.slide_2.coefficient': 12.0})
+    late = with_effects(MODEL, {
+        'time_delay': {f'{drive}.delay': 0.008 for drive in DRIVES},
+        'viscous_friction': {'slide_2.coefficient': 12.0}})
     recording = record(late, 0.05)
     recording.effort[:, 2] = np.nan
     found = diagnose(MODEL, [recording])

@@ -84,7 +84,8 @@ def catalogue_of_random_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(components_module, 'searched_in_drives', lambda design: list(ON_DRIVES))
     # Nothing of it knows loads or turns over.
     for kind in ('reversal_rows', 'deviation_rows'):
-        monkeypatch.setattr(components_module, kind, lambda *_: np.zeros((0, SAMPLES)))
+        monkeypatch.setattr(components_module, kind, lambda design, term, units: np.zeros(
+            (len(units), 0, SAMPLES)))
 
 
 def random_design(truth: Mapping[tuple[str, int | None], float], seed: int) -> RandomDesign:

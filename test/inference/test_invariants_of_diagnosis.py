@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from planar_arm import planar_arm
 from single_axis import AXIS, TIME, Effects, axis, axis_motion, axis_recording
 
@@ -168,8 +169,7 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     planar_arm(tmp_path, 2)
     path = tmp_path / 'arm.yaml'
     model = DriveModel.load(path)
-    hidden = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
-        f'effects.{name}.j2.{key}': one for key, one in size.items()}}, model.source)
+    hidden = with_effects(model, {name: {f'j2.{key}': one for key, one in size.items()}})
     size, omega = np.array([0.6, 0.8]), 2 * np.pi * np.array([0.5, 0.75])
     phase = TIME[:, None] * omega + [0.3, 1.1]
     moved = JointMotion(size * np.sin(phase), size * omega * np.cos(phase),

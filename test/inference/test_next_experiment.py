@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model_recordings import record
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.experiments.information import (
@@ -33,7 +34,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -57,14 +57,6 @@ def series() -> JointSeries:
     sizes = np.repeat((0.03, 0.08), 3)[:, None] / 2
     return JointSeries(sizes * rng.uniform(-1, 1, (6, JointSeries.size(HARMONICS))), MIDDLE,
                        DURATION, HARMONICS)
-
-
-def recorded(model: DriveModel, motion: PlatformMotion, seed: int, noise: float) -> Recording:
-    """Return what perfect encoders and noisy efforts would record of a motion."""
-    forces = model.drive_forces(motion)
-    rng = np.random.default_rng(seed)
-    return Recording.from_arrays('run', motion.time, forces.mechanism.position, None,
-                                 forces.total + noise * rng.normal(size=forces.total.shape))
 
 
 # Paths.
@@ -119,7 +111,7 @@ def design(model: DriveModel, series: JointSeries) -> Design:
     """Columns on a recording of a robot that has effects already."""
     model = DriveModel.from_parameters({**model.values, **EFFECTS})
     motion = platform_motion(series, np.arange(0.0, DURATION, 0.002))
-    return Design.of(model, [recorded(model, motion, 0, 0.0)])
+    return Design.of(model, [record(model, motion=lambda _: motion, time=motion.time)])
 
 
 def test_what_a_motion_would_tell_is_what_its_recording_tells(

@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
 from random_states import inverse_kinematics, paper_model
 
@@ -184,9 +185,7 @@ def test_edges_are_dropped_at_both_ends_of_every_segment_and_blocks_stay_within(
 
 def test_effects_with_memory_run_through_a_segment_and_start_afresh_in_the_next():
     real = truth()
-    model = paper_model({'effects.active': ['hysteresis'],
-                         'effects.hysteresis.lift_1.force': 1.0,
-                         'effects.hysteresis.lift_1.distance': 1e-3})
+    model = with_effects(MODEL, {'hysteresis': {'lift_1.force': 1.0, 'lift_1.distance': 1e-3}})
     keep = np.r_[0:2000, 2200:4000]
     found = reconstruct(model, recording_of(
         real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position[keep])))

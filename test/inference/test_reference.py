@@ -130,6 +130,24 @@ def test_ripple_and_reversals_of_the_reference_are_no_change(
     assert [one.name for one in found.effects] == (['coulomb_friction'] if change else [])
 
 
+def test_wrong_numbers_of_the_base_are_carried_over_to_another_path(
+    machine: tuple[DriveModel, Reference],
+) -> None:
+    """Where the reference was not, theta alone says what wrong masses and friction need."""
+    model, _ = machine
+    wrong = DriveModel.from_parameters({
+        **model.values, 'links.mass': tuple(1.1 * np.array(model.robot.inertial)[:, 0]),
+        'friction.viscous': tuple(0.8 * np.array(model.values['friction.viscous']))}, model.source)
+    runs = [arm.record(model, arm.motion(20.0, seed=seed), NOISE, seed) for seed in (0, 5)]
+    assert pprs.diagnose(wrong, runs[1]).verdict != 'adequate'
+    assert pprs.diagnose(wrong, runs[1], reference=runs[0]).verdict == 'adequate'
+    design = Design.of(wrong, runs[1:])
+    carried = Reference.of(wrong, runs[:1]).carried_over(design)
+    error = design.residuals.error
+    left = error - carried.of_base
+    assert np.nanstd(left) < 0.3 * np.nanstd(error)
+
+
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.1), (5, 0.0)])
 def test_what_a_reference_leaves_open_is_no_change(
         machine: tuple[DriveModel, Reference], path: int, day: float) -> None:

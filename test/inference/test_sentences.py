@@ -23,10 +23,10 @@ from made_up_diagnosis import (
 from made_up_recordings import judged, measured
 from rich.console import Console
 
+from pprs_dynamics.app.api.adopt import AdoptionRunResult
+from pprs_dynamics.app.api.diagnose import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import _parser
-from pprs_dynamics.app.report.adoption_report import run_view
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
@@ -146,7 +146,9 @@ def test_an_unexplained_error_is_recorded_again_before_anything_is_adopted(count
 def test_a_run_that_ends_ambiguous_names_the_files_of_the_next_command() -> None:
     run = AdoptionRun((), 'ambiguous', 'base_tilt explains them as well', DriveModel.load())
     command = GivenFiles(('a.csv',)).command('next-experiment', '--output', 'next.csv')
-    assert command in in_one_line(as_text(run_view(run, command), 200))
+    result = AdoptionRunResult(Inputs(DriveModel.load(), {'a.csv': measured()}, {},
+                                      frozenset({'a.csv'}), model_path='MODEL.yaml'), run)
+    assert command in in_one_line(as_text(result.view(), 200))
 
 
 def test_commands_say_whose_robot_the_model_is() -> None:

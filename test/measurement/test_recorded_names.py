@@ -11,12 +11,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_up_recordings import CONTROLLER, STORE, header, message, write_plain_bag
+from made_up_recordings import CONTROLLER, STORE, header, message, states_of, write_plain_bag
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.drives import DRIVES, RecordedDrives
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.inference.readings.columns import guess_columns
+from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    describe,
+    read_recording,
+    write_recording,
+)
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 
@@ -118,3 +125,107 @@ def test_names_that_are_none_are_refused(keys: dict[str, Any]) -> None:
     read = joint_names if any(key.startswith('joint') for key in keys) else recorded_columns
     with pytest.raises(ModelError):
         read(values, DRIVES)
+
+
+# What is measured of drives beside motion and effort, from files of several kinds.
+
+JOINTS = ('j1', 'j2')
+TIME = np.arange(200) * 0.01
+POSITION = np.sin(TIME[:, None] * [1.0, 1.7])
+EFFORT = 2 * np.cos(TIME[:, None] * [1.0, 1.7])
+WARM = 30 + TIME  # what j2's thermometer says, every tenth sample
+SELDOM = np.where(np.arange(200) % 10 == 0, WARM, np.nan)
+
+
+def table(path: Path, **more: np.ndarray) -> Path:
+    """Write a table of our format with further columns."""
+    columns = {'time': TIME, **{f'{joint}/{name}': values[:, k] for name, values in (
+        ('position', POSITION), ('effort', EFFORT)) for k, joint in enumerate(JOINTS)}, **more}
+    rows = zip(*columns.values(), strict=True)
+    path.write_text(','.join(columns) + '\n' + ''.join(
+        ','.join('' if np.isnan(x) else repr(float(x)) for x in row) + '\n' for row in rows))
+    return path
+
+
+def read(path: Path, **keys: Any) -> Recording:
+    columns = recorded_columns({f'columns.{key.replace("__", ".")}': value
+                                for key, value in keys.items()}, JOINTS)
+    return read_recording(path, RecordedDrives(JOINTS, columns=columns))
+
+
+def test_a_column_of_a_drive_is_its_channel_and_gaps_stay_gaps(tmp_path):
+    recording = read(table(tmp_path / 'a.csv', **{'j2/temperature': SELDOM}))
+    found = recording.channels['temperature']
+    np.testing.assert_array_equal(found[:, 1], SELDOM)
+    assert np.isnan(found[:, 0]).all()
+    assert set(recording.channels) == {'temperature'}
+    assert describe(recording).drives['j2'].channels == {
+        'temperature': (WARM[0], pytest.approx(WARM[190]))}
+    assert describe(recording).drives['j1'].channels == {}
+    assert not [one for one in recording.findings if one.kind == 'ignored_columns']
+
+
+def test_columns_of_a_model_file_and_of_the_whole_machine(tmp_path):
+    file = table(tmp_path / 'a.csv', T2=WARM, oil=WARM + 5, hall=np.full(200, 1e5))
+    found = read(file, temperature='oil', j2__temperature='T2', pressure='hall').channels
+    np.testing.assert_allclose(found['temperature'], np.column_stack([WARM + 5, WARM]))
+    np.testing.assert_allclose(found['pressure'], 1e5)
+
+
+@pytest.mark.parametrize('name', ['run.csv', 'run.mcap', 'bag'])
+def test_what_is_written_is_read_again(tmp_path, name):
+    channels = {'temperature': np.column_stack([np.full(200, np.nan), SELDOM]),
+                'link_position': np.column_stack([POSITION[:, 0] + 0.01, np.full(200, np.nan)])}
+    written = Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS, channels)
+    write_recording(tmp_path / name, written)
+    found = read(tmp_path / name).channels
+    for channel, values in channels.items():
+        np.testing.assert_allclose(found[channel], values)
+
+
+def test_dropped_samples_take_their_temperature_with_them():
+    broken = POSITION.copy()
+    broken[3] = np.nan
+    recording = Recording.from_arrays('x', TIME, broken, None, EFFORT, JOINTS,
+                                      {'temperature': np.column_stack([WARM, WARM])})
+    np.testing.assert_array_equal(recording.channels['temperature'][:, 0], np.delete(WARM, 3))
+
+
+def bag(path: Path, topic: str, messages: list[Any]) -> Path:
+    """Write joint states, and messages on another topic."""
+    return write_plain_bag(path / 'bag', {'/joint_states': states_of(
+        {'time': TIME, 'position': POSITION, 'velocity': None, 'effort': EFFORT}, JOINTS),
+        topic: messages})
+
+
+@pytest.mark.parametrize(('topic', 'frame', 'drives'), [
+    ('/drives/j2/temperature', '', (1,)), ('/motor_temperature', 'j2', (1,)),
+    ('/j2_temperature', '', (1,)), ('/gearbox/temperature', 'base', (0, 1))])
+def test_a_thermometer_belongs_to_the_drive_that_it_names(tmp_path, topic, frame, drives):
+    found = read(bag(tmp_path, topic, [STORE.types['sensor_msgs/msg/Temperature'](
+        header(round(t * 1e9), frame), 40 + t, 0.0) for t in (0.0, 0.5, 1.0)]))
+    temperature = found.channels['temperature']
+    for d in (0, 1):
+        known = np.flatnonzero(np.isfinite(temperature[:, d]))
+        assert list(found.time[known] - found.time[0]) == (
+            pytest.approx([0.0, 0.5, 1.0]) if d in drives else [])
+        np.testing.assert_allclose(temperature[known, d], [40, 40.5, 41][:len(known)])
+
+
+def test_joint_states_on_a_topic_of_temperatures(tmp_path):
+    found = read(bag(tmp_path, '/joint_temperatures', [
+        message(round(t * 1e9), ['j2', 'j1'], [50 + t, 20.0]) for t in (0.2, 0.4)]))
+    np.testing.assert_allclose(found.channels['temperature'][[20, 40]], [[20, 50.2], [20, 50.4]])
+    np.testing.assert_allclose(found.effort, EFFORT)
+
+
+def test_temperatures_are_guessed_by_their_names():
+    rng = np.random.default_rng(0)
+    names = [f'{kind}_{k}' for kind in ('q', 'tau', 'joint_temperature', 'target_temp')
+             for k in (0, 1)]
+    series = [Series('t', 't', np.arange(50) * 0.01),
+              *(Series(name, name, rng.normal(size=50)) for name in names)]
+    columns = guess_columns(series, JOINTS).columns
+    assert columns['j1', 'temperature'] == 'joint_temperature_0'
+    assert columns['j2', 'temperature'] == 'joint_temperature_1'
+    assert columns['j2', 'effort'] == 'tau_1'

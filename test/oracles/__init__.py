@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The 3-PPRS in two physics engines, which share no kinematics with the package."""
+"""Models that are independent of the package."""

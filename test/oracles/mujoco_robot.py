@@ -1,24 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The 3-PPRS in MuJoCo."""
+"""The 3-PPRS in MuJoCo, which shares no kinematics with the package.
+
+The mechanism is cut at its three spherical joints into four trees: the free platform, and three
+chains slide-lift-hinge. MuJoCo supplies kinematics, Jacobians and inverse dynamics of the trees;
+here Newton's method closes the cuts, and d'Alembert's principle projects forces onto the drives.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from oracles.closed_chain import ClosedChain
-
 UP = np.array([0.0, 0.0, 1.0])
+# Positions of half a metre carry rounding errors of a few 1e-16 m.
+CLOSURE_TOLERANCE = 2e-15
+MAXIMUM_STEPS = 30
+HINGES = np.array([2, 5, 8])
+DRIVES = np.array([0, 3, 6, 1, 4, 7])  # slides, then lifts, among (slide, lift, hinge) x 3
 
 
-class MujocoRobot(ClosedChain):
-    """Trees built with MjSpec; kinematics, Jacobians and inverse dynamics by MuJoCo."""
+@dataclass
+class OracleForces:
+    """What an engine says about N states.
+
+    Parameters
+    ----------
+    force : (N, 6) array
+        Frictionless drive forces [N].
+    passive : (N, 6) array
+        Drive forces against viscous friction of the passive joints [N].
+    position, velocity, acceleration : (N, 6) arrays
+        Of the drives [m, m/s, m/s^2].
+    """
+
+    force: np.ndarray
+    passive: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+class MujocoRobot:
+    """A 3-PPRS cut at the spherical joints.
+
+    Velocity coordinates are the platform's six, then (slide, lift, hinge) per chain. A hinge angle
+    of 0 is a rod that points up, pi one that points down.
+    """
 
     def __init__(self, robot) -> None:
-        super().__init__(robot)
-        self.model = _build(robot).compile()
+        self.robot = robot
+        self.model = trees(robot).compile()
         self.data = mujoco.MjData(self.model)
         names = [f'{kind}_{i}' for kind in ('tip', 'point') for i in range(3)]
         ids = [mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name) for name in names]
@@ -35,9 +70,11 @@ class MujocoRobot(ClosedChain):
         mujoco.mj_comPos(self.model, self.data)
 
     def gaps(self) -> np.ndarray:
+        """Return rod tips minus platform points, (9,) [m]."""
         return (self.data.site_xpos[self.tips] - self.data.site_xpos[self.points]).ravel()
 
     def gap_jacobian(self) -> np.ndarray:
+        """Return the derivative of `gaps` with respect to the velocities, (9, 15)."""
         return np.concatenate([
             self._site_jacobian(tip) - self._site_jacobian(point)
             for tip, point in zip(self.tips, self.points, strict=True)])
@@ -51,6 +88,7 @@ class MujocoRobot(ClosedChain):
         return np.concatenate((a, self._platform_rotation().T @ epsilon))
 
     def gap_drift(self, velocity) -> np.ndarray:
+        """Return the second derivative of `gaps` at zero acceleration, (9,)."""
         self.data.qvel[:] = velocity
         mujoco.mj_comVel(self.model, self.data)
         return np.concatenate([
@@ -64,6 +102,7 @@ class MujocoRobot(ClosedChain):
         return self.data.qfrc_inverse.copy()
 
     def joint_rates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return Jacobians (3, 3, 15) of rod against lift, and of rod against platform."""
         platform = self._spin_jacobian('platform')
         rods = np.array([self._spin_jacobian(f'rod_{i}') for i in range(3)])
         lifts = np.array([self._spin_jacobian(f'lift_{i}') for i in range(3)])
@@ -88,8 +127,63 @@ class MujocoRobot(ClosedChain):
         mujoco.mj_jacBody(self.model, self.data, None, jacobian, self.bodies[body])
         return jacobian
 
+    def solve(self, motion, c_revolute=0.0, c_spherical=0.0) -> OracleForces:
+        """Return forces and drive motion for every sample of a platform motion."""
+        rows = [self._solve_one(motion, sample, c_revolute, c_spherical)
+                for sample in range(len(motion.position))]
+        return OracleForces(*(np.array(column) for column in zip(*rows, strict=True)))
 
-def _build(robot) -> mujoco.MjSpec:
+    def _solve_one(self, motion, sample, c_revolute, c_spherical):
+        P, quaternion = motion.position[sample], motion.orientation[sample]
+        v, omega = motion.linear_velocity[sample], motion.angular_velocity[sample]
+        a, epsilon = motion.linear_acceleration[sample], motion.angular_acceleration[sample]
+        chains = self._close(P, quaternion)
+        gap_jacobian = self.gap_jacobian()
+        of_platform, of_chains = gap_jacobian[:, :6], gap_jacobian[:, 6:]
+        follow = -np.linalg.solve(of_chains, of_platform)  # chain velocities per platform velocity
+        platform = self.platform_velocity(v, omega)
+        velocity = np.concatenate((platform, follow @ platform))
+        platform = self.platform_acceleration(v, omega, a, epsilon)
+        drift = np.linalg.solve(of_chains, self.gap_drift(velocity))
+        acceleration = np.concatenate((platform, follow @ platform - drift))
+        # All velocities per drive velocity: the rows of the drives form the unit matrix.
+        all_per_platform = np.concatenate((np.eye(6), follow))
+        force = self.inverse_dynamics(velocity, acceleration)
+        revolute, spherical = self.joint_rates()
+        damping = (c_revolute * np.einsum('ckv,ckw->vw', revolute, revolute)
+                   + c_spherical * np.einsum('ckv,ckw->vw', spherical, spherical)) @ velocity
+        projected = np.linalg.solve(
+            follow[DRIVES].T, all_per_platform.T @ np.stack((force, damping), axis=1))
+        chain_velocity, chain_acceleration = velocity[6:], acceleration[6:]
+        return (projected[:, 0], projected[:, 1], chains[DRIVES], chain_velocity[DRIVES],
+                chain_acceleration[DRIVES])
+
+    def _close(self, position, quaternion) -> np.ndarray:
+        """Move the chains until their tips meet the platform, and leave the engine there."""
+        geometry = self.robot.geometry
+        up = geometry.elbow == 'up'
+        chains = np.zeros(9)
+        chains[1::3] = position[2] - (1 if up else -1) * geometry.rod_length
+        chains[HINGES] = 0.0 if up else np.pi
+        best, best_chains = np.inf, chains
+        for _ in range(MAXIMUM_STEPS):
+            self.place(position, quaternion, chains)
+            gaps = self.gaps()
+            size = np.abs(gaps).max()
+            if size >= best and best < CLOSURE_TOLERANCE:
+                break  # only rounding is left
+            if size < best:
+                best, best_chains = size, chains.copy()
+            chains = chains - np.linalg.solve(self.gap_jacobian()[:, 6:], gaps)
+        assert best < CLOSURE_TOLERANCE, f'the engine did not close its chains: {best} m'
+        leaning = np.cos(best_chains[HINGES])
+        assert np.all(leaning > 0 if up else leaning < 0), 'the engine closed the other elbow'
+        self.place(position, quaternion, best_chains)
+        return best_chains
+
+
+def trees(robot) -> mujoco.MjSpec:
+    """Return the four trees."""
     geometry, masses = robot.geometry, robot.masses
     spec = mujoco.MjSpec()
     spec.option.gravity = robot.gravity

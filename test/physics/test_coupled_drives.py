@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from made_up_arm import motion, write_arm
+from model_recordings import with_effects
 from numpy.testing import assert_allclose
 
 from pprs_dynamics import DriveModel
@@ -21,15 +22,9 @@ def arm(tmp_path):
     return DriveModel.load(write_arm(tmp_path, friction__motors=MAP))
 
 
-def with_effect(model, name, **values):
-    found = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
-        f'effects.{name}.{key.replace("__", ".")}': value for key, value in values.items()}},
-        model.source)
-    return found
-
-
 def added(model, name, at, **values):
-    return with_effect(model, name, **values).drive_forces(at).parts[name]
+    return with_effects(model, {name: {key.replace('__', '.'): value for key, value in
+                                       values.items()}}).drive_forces(at).parts[name]
 
 
 def test_friction_at_the_motor_does_the_same_work_as_in_its_joints(arm):

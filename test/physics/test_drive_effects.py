@@ -13,10 +13,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from pprs_dynamics import DriveModel, Excitation
+from pprs_dynamics import DriveModel, Excitation, PlatformMotion
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
@@ -34,6 +37,8 @@ from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFrict
 from pprs_dynamics.physics.effects.laws.stop_contact import StopContact
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.forces import ModelState
 
 EFFECTS: tuple[type[DriveEffect], ...] = (
     AsymmetricFriction, CoulombFriction, DriveInertia, DriveSpring, EffortOffset, ForceRipple,
@@ -294,8 +299,7 @@ def moved(model: DriveModel, start: float, state: Any) -> np.ndarray:
 
 
 def with_effect(name: str, **values: float) -> DriveModel:
-    return DriveModel.from_parameters({**DriveModel.load().values, 'effects.active': [name], **{
-        f'effects.{name}.lift_1.{key}': value for key, value in values.items()}})
+    return with_effects(PAPER, {name: {f'lift_1.{key}': value for key, value in values.items()}})
 
 
 def test_a_warm_drive_does_not_get_cold_as_a_parameter_changes() -> None:
@@ -327,3 +331,63 @@ def test_a_stressed_contact_does_not_relax_as_a_parameter_changes() -> None:
     moved(expected, 0.0, whole)
     assert moved(other, 4.0, again)['hysteresis'] == pytest.approx(
         moved(expected, 4.0, whole)['hysteresis'], abs=1e-12)
+
+
+# Times that go back: every effect begins anew, and no force grows.
+
+PAPER = DriveModel.load()
+STEPS = 0.01 * np.arange(40)
+MOTION = HelicalPath().motion(1.0 + STEPS)
+
+
+def with_any(name: str) -> DriveModel:
+    """Return the paper's robot with an effect on its first drive, or on the platform."""
+    effect = PAPER.bound(CATALOGUE[name])
+    if name == 'measured_curve':
+        own = {'variable': 'position', 'from': -1.0, 'to': 1.0, 'values': [0.0, 1.0, 2.0]}
+    else:
+        own = {each.name: float(np.clip(
+            0.3 if math.isinf(each.upper) or each.upper > 1 else each.upper / 2,
+            each.lower, each.upper)) for each in effect.parameters}
+    place = f'{DRIVES[0]}.' if issubclass(effect, DriveEffect) or name == 'measured_curve' else ''
+    return with_effects(PAPER, {name: {f'{place}{key}': value for key, value in own.items()}})
+
+
+def efforts(model: DriveModel, state: ModelState, start: float, motion: PlatformMotion,
+            step: int = 1) -> np.ndarray:
+    """Return measured efforts of a stream of samples from a time on, so many at a time."""
+    found = []
+    for k in range(0, len(motion), step):
+        piece = motion[k:k + step].with_time(start + STEPS[k:k + step])
+        forces = model.drive_forces(piece, state)
+        found.append(model.measured(forces, state).total)
+    return np.concatenate(found)
+
+
+# Of other robots, and without a memory.
+ELSEWHERE = {'counterbalance', 'coupled_drives', 'eccentric_encoder'}
+
+
+def test_every_effect_with_a_memory_is_tried() -> None:
+    for name in ELSEWHERE:
+        effect = CATALOGUE[name]
+        assert not (issubclass(effect, DriveEffect) and effect.drive_memory())
+
+
+@pytest.mark.parametrize('name', [name for name in CATALOGUE if name not in ELSEWHERE])
+@pytest.mark.parametrize('start', [5.0])
+def test_an_effect_begins_anew_and_gives_what_it_gave_at_first(name: str, start: float) -> None:
+    model = with_any(name)
+    state, fresh = model.initial_state(), model.initial_state()
+    efforts(model, state, 1000.0, MOTION)
+    again = efforts(model, state, start, MOTION)
+    assert np.isfinite(again).all()
+    np.testing.assert_array_equal(again, efforts(model, fresh, start, MOTION))
+
+
+def test_a_stream_that_goes_on_remembers() -> None:
+    model = with_any('hysteresis')
+    state = model.initial_state()
+    efforts(model, state, 1000.0, MOTION)
+    later = efforts(model, state, 1000.0 + len(STEPS) * 0.01, MOTION)
+    assert np.abs(later - efforts(model, model.initial_state(), 0.0, MOTION)).max() > 0.01

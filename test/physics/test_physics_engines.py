@@ -1,20 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drive forces against two physics engines that share no kinematics with the package."""
+"""Drive forces against MuJoCo and Pinocchio, which share no kinematics with the package."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-
-# Only a missing library skips these tests; a broken oracle must fail.
 from oracles.mujoco_robot import MujocoRobot
-from oracles.pinocchio_robot import PinocchioRobot
 from random_states import ELBOWS, model_of, random_motion, random_robot
 
-ENGINES = {'mujoco': MujocoRobot, 'pinocchio': PinocchioRobot}
+from benchmarks.speed.peers import PinocchioPeer
+
 STATES = 1000
 # Forces of some 40 N carry rounding errors near 1e-14 N; a wrong term shows at 1e-3 N or more.
 FORCE_TOLERANCE = 1e-10
@@ -25,7 +23,6 @@ VISCOUS_ONLY = {
     'friction.revolute.viscous': C_REVOLUTE, 'friction.spherical.viscous': C_SPHERICAL,
     'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
 
-every_engine = pytest.mark.parametrize('engine', ENGINES.values(), ids=ENGINES.keys())
 every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
 
 
@@ -42,34 +39,31 @@ def states(request):
 
 
 @pytest.fixture(scope='module')
-def answers(states):
-    """Return the answer of each engine for `states`, worked out once."""
+def oracle(states):
+    """Return MuJoCo's answer for `states`, worked out once."""
     robot, motion, _ = states
-    return {engine: engine(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
-            for engine in ENGINES.values()}
+    return MujocoRobot(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
 
 
-@every_engine
-def test_drive_motion_is_the_engines(states, answers, engine):
-    chains, oracle = states[2].mechanism.links, answers[engine]
+def test_drive_motion_is_the_engines(states, oracle):
+    chains = states[2].mechanism.links
     # Accelerations up to some 100 m/s^2 come from divisions by sin u.
     assert_allclose(chains.position, oracle.position, rtol=0, atol=1e-14)
     assert_allclose(chains.velocity, oracle.velocity, rtol=0, atol=1e-13)
     assert_allclose(chains.acceleration, oracle.acceleration, rtol=0, atol=1e-11)
 
 
-@every_engine
-def test_frictionless_drive_forces_are_the_engines(states, answers, engine):
-    assert len(states[1]) >= STATES
-    assert_allclose(states[2].parts['rigid_body'], answers[engine].force, rtol=0,
+def test_frictionless_drive_forces_are_those_of_both_engines(states, oracle):
+    robot, motion, forces = states
+    assert len(motion) >= STATES
+    for expected in (oracle.force, PinocchioPeer(robot).many(motion)):
+        assert_allclose(forces.parts['rigid_body'], expected, rtol=0, atol=FORCE_TOLERANCE)
+
+
+def test_viscous_friction_of_passive_joints_is_the_engines(states, oracle):
+    assert np.abs(oracle.passive).max() > 0.1
+    assert_allclose(states[2].parts['passive_friction'], oracle.passive, rtol=0,
                     atol=FORCE_TOLERANCE)
-
-
-@every_engine
-def test_viscous_friction_of_passive_joints_is_the_engines(states, answers, engine):
-    oracle = answers[engine].passive
-    assert np.abs(oracle).max() > 0.1
-    assert_allclose(states[2].parts['passive_friction'], oracle, rtol=0, atol=FORCE_TOLERANCE)
 
 
 # The errors of (7) and (12) as printed, on states of this kind: both would be caught above.
@@ -80,7 +74,7 @@ def test_printed_equation_7_contradicts_the_engines(elbow):
     robot = random_robot(rng, elbow)
     motion = random_motion(rng, 50, elbow)
     printed = model_of(robot, {'equations': 'printed'}).drive_forces(motion).parts['rigid_body']
-    oracle = PinocchioRobot(robot).solve(motion).force
+    oracle = MujocoRobot(robot).solve(motion).force
     assert_allclose(printed[:, :3], oracle[:, :3], rtol=0, atol=FORCE_TOLERANCE)
     assert np.abs(printed[:, 3:] - oracle[:, 3:]).max() > 0.1
 
@@ -92,7 +86,7 @@ def test_printed_equation_12_contradicts_the_engines_but_has_their_power(elbow):
     motion = random_motion(rng, 50, elbow)
     forces = model_of(robot, {**VISCOUS_ONLY, 'equations': 'printed'}).drive_forces(motion)
     printed, q_dot = forces.parts['passive_friction'], forces.mechanism.velocity
-    oracle = PinocchioRobot(robot).solve(motion, C_REVOLUTE, C_SPHERICAL).passive
+    oracle = MujocoRobot(robot).solve(motion, C_REVOLUTE, C_SPHERICAL).passive
     assert np.abs(printed - oracle).max() > 0.1
     assert_allclose(np.sum(q_dot * printed, axis=1), np.sum(q_dot * oracle, axis=1), rtol=0,
                     atol=1e-12)

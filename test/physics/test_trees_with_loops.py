@@ -14,14 +14,18 @@ import pytest
 import robots_with_loops as robots
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from model_recordings import with_effects
 from oracles.mujoco_loops import MujocoLoops
 from random_states import random_motion
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.mechanism import evaluation
+from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.mechanism.tree_equations import solve
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar}
@@ -169,8 +173,7 @@ def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> Non
     motion = random_motion(np.random.default_rng(4), 100)
     parts = []
     for one, values in zip((paper, model), OF_BOTH[name], strict=True):
-        changed = DriveModel.from_parameters({**one.values, 'effects.active': [name], **{
-            f'effects.{name}.{key}': value for key, value in values.items()}}, one.source)
+        changed = with_effects(one, {name: values})
         s = paper.drive_forces(motion).mechanism
         parts.append(changed.drive_forces(motion if one is paper else JointMotion(
             s.position, s.velocity, s.acceleration)).parts)
@@ -358,3 +361,121 @@ def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own
     slide = -0.1 * np.sin(0.8)
     assert found == pytest.approx(3.0 * np.tanh(0.02 / 0.02) + 5.0 * slide * np.tanh(
         slide * 0.02 / 0.002), abs=1e-9)
+
+
+# Elimination that passes over zeros, against LAPACK; pivots that vanish included.
+
+SIZE, RIGHT_SIDES = 14, 3
+
+
+def a_platform_on_legs(random: np.random.Generator) -> np.ndarray:
+    """Return a matrix of four legs of 3 rows and 2 joints of their own, a platform, and a pair."""
+    pattern = np.zeros((SIZE, SIZE), dtype=bool)
+    for leg in range(4):
+        pattern[3 * leg:3 * leg + 3, 2 * leg:2 * leg + 2] = True
+        pattern[3 * leg:3 * leg + 3, 8:12] = True
+    pattern[12:, 12:] = True
+    shuffled = pattern[random.permutation(SIZE)][:, random.permutation(SIZE)]
+    return random.normal(size=shuffled.shape) * shuffled
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_it_solves_what_lapack_solves(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    for k in range(12):
+        A = a_platform_on_legs(random)
+        if 4 < k < 10:
+            A[k, k] = A[0, 0] = 1e-13 * random.normal()
+        elif k > 9:
+            A[:3, :2] *= 1e-9
+        B = random.normal(size=(SIZE, RIGHT_SIDES))
+        left, right = A.copy(), B.copy()
+        determinant = solve(left, right)
+        assert determinant == pytest.approx(np.linalg.det(A), rel=1e-8)
+        expected = np.linalg.solve(A, B)
+        scale = np.linalg.cond(A) * np.abs(expected).max()
+        assert np.abs(right - expected).max() < 1e-13 * scale
+
+
+# Links and joints that no motion tells apart.
+
+# A parallelogram in the vertical plane, and a pointer on its coupler: crank and follower turn
+# alike about parallel pins, the coupler only translates.
+LINK = ('<link name="{0}"><inertial><origin xyz="{1} 0 {2}"/><mass value="{3}"/><inertia '
+        'ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>')
+JOINT = ('<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin '
+         'xyz="{3} 0 {4}"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" '
+         'velocity="5"/></joint>')
+PARALLELOGRAM = '\n'.join([
+    '<robot name="parallelogram"><link name="base"/>',
+    LINK.format('crank', 0.01, 0.1, 1.0), JOINT.format('crank_pin', 'base', 'crank', 0, 0),
+    LINK.format('coupler', 0.2, 0, 0.5), JOINT.format('knee', 'crank', 'coupler', 0, 0.3),
+    LINK.format('follower', 0, -0.2, 0.7), JOINT.format('ankle', 'coupler', 'follower', 0.4, 0),
+    LINK.format('pointer', 0, 0.1, 0.3), JOINT.format('pivot', 'coupler', 'pointer', 0.5, 0),
+    '</robot>'])
+PARALLELOGRAM_FILE = """
+/**:
+  ros__parameters:
+    robot:
+      urdf: parallelogram.urdf
+      base: base
+      tool: pointer
+      drives: [crank_pin, pivot]
+      loops:
+        rear:
+          type: revolute
+          a: {link: follower, xyz: [0.0, 0.0, -0.3], rpy: [-1.5707963267949, 0.0, 0.0]}
+          b: {link: base, xyz: [0.4, 0.0, 0.0], rpy: [-1.5707963267949, 0.0, 0.0]}
+    friction: {viscous: [0.1, 0.1], coulomb: [0.2, 0.2], reversal_velocity: 0.01}
+"""
+
+
+@pytest.fixture(scope='module')
+def parallelogram(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
+    """Return its model."""
+    folder: Path = tmp_path_factory.mktemp('parallelogram')
+    (folder / 'parallelogram.urdf').write_text(PARALLELOGRAM)
+    file = folder / 'model.yaml'
+    file.write_text(PARALLELOGRAM_FILE)
+    return DriveModel.load(file)
+
+
+def test_links_that_turn_alike_are_grouped_and_no_others(parallelogram: DriveModel) -> None:
+    robot = parallelogram.robot
+    names = [tuple(robot.body_names[k] for k in group) for group in alike_bodies(robot)]
+    assert names == [('crank', 'follower'), ('coupler',), ('pointer',)]
+
+
+def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: DriveModel) -> None:
+    """At the same place relative to the pin that stands, whatever the motion."""
+    rng = np.random.default_rng(3)
+    q, v, a = rng.uniform(-0.5, 0.5, (3, 30, 2))
+    body = np.array([0.4, 0.02, 0.0, 0.1, 0.03, 0.0, 0.03, 0.0, 0.0, 0.001])
+    # The follower's origin is 0.3 m above its pin: m, m c and I about the pin, moved there.
+    m, c, h = body[0], body[1:4] / body[0], 0.3
+    shifted = c - [0, 0, h]
+    inertia = np.array([[body[4], body[5], body[7]], [body[5], body[6], body[8]],
+                        [body[7], body[8], body[9]]])
+    about = inertia - m * ((c @ c) * np.eye(3) - np.outer(c, c))
+    there = about + m * ((shifted @ shifted) * np.eye(3) - np.outer(shifted, shifted))
+    same = np.array([m, *(m * shifted), there[0, 0], there[0, 1], there[1, 1], there[0, 2],
+                     there[1, 2], there[2, 2]])
+    robot = parallelogram.robot
+    on_crank, on_follower = (robot.with_body(link, what).torques(q, v, a)
+                             for link, what in (('crank', body), ('follower', same)))
+    assert on_crank == pytest.approx(on_follower, abs=1e-9)
+    assert np.abs(on_crank - robot.torques(q, v, a)).max() > 0.1
+
+
+def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
+    parallelogram: DriveModel,
+) -> None:
+    groups = proportional_joints(parallelogram.robot.structure)
+    assert groups == (('crank_pin', 'knee', 'ankle'), ('pivot',))
+    offered = {names[0] for names in parallelogram.bound(JointFrictionEffect).variants}
+    assert not offered & {'knee.viscous', 'ankle.torque'}
+    assert 'rear.viscous' in offered  # loops are not looked at
+    motion = JointMotion(*np.random.default_rng(1).uniform(-0.5, 0.5, (3, 20, 2)))
+    knee = JointFrictionEffect.bound(parallelogram.robot).from_file({'knee.viscous': 0.3})
+    forces = knee.force(parallelogram.mechanism(motion))
+    assert forces[:, 0] == pytest.approx(0.3 * motion.velocity[:, 0], abs=1e-9)

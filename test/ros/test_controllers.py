@@ -22,6 +22,7 @@ from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
+from pprs_dynamics.ros.play_trajectory import LONGEST_CATCH_UP, Beats
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
@@ -70,3 +71,31 @@ def test_a_piece_in_motion_needs_an_end_at_rest() -> None:
     assert not settings().allow_nonzero_velocity_at_trajectory_end
     assert 'last point' in objection(forwarded(10, 0.02, stop_time=0.0), plain, NOW + WAY)
     assert objection(forwarded(10, 0.02), plain, NOW + WAY) == ''
+
+
+# When `play_trajectory` sends its messages: by the clock, whatever the timer misses.
+
+PERIOD = 10_000_000  # [ns]
+BEGUN = 1_700_000_000_000_000_000  # [ns]
+CATCH_UP = round(LONGEST_CATCH_UP * 1e9)
+
+
+def played(ticks: list[int]) -> list[list[int]]:
+    """Return the moments, from the start on, that are due at each tick [ns]."""
+    beats = Beats(PERIOD)
+    return [[moment - BEGUN for moment in beats.due(BEGUN + tick)] for tick in ticks]
+
+
+def test_what_a_timer_leaves_out_is_caught_up_with() -> None:
+    assert played([0, PERIOD, 4 * PERIOD, 5 * PERIOD]) == [
+        [0], [PERIOD], [2 * PERIOD, 3 * PERIOD, 4 * PERIOD], [5 * PERIOD]]
+
+
+def test_after_a_standstill_it_goes_on_from_now() -> None:
+    after = CATCH_UP + 3 * PERIOD + 7
+    assert played([0, after, after + PERIOD]) == [[0], [after], [after + PERIOD]]
+
+
+def test_where_the_clock_is_set_back_it_goes_on_from_now() -> None:
+    assert played([0, PERIOD, -50 * PERIOD, -49 * PERIOD]) == [
+        [0], [PERIOD], [-50 * PERIOD], [-49 * PERIOD]]

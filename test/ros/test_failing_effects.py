@@ -11,31 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 from failing_effects import FAULTS, fail, parameters
-from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from feedforward_bench import EQUAL, feedforward_bench, held, message_of, random_motion
 from monitor_bench import MonitorBench
 from node_bench import bench
 from rclpy.parameter import Parameter
-
-from pprs_dynamics import DriveModel, PlatformMotion
 
 MOTION = random_motion(np.random.default_rng(11), 3)
 ONE = MOTION[:1]
 
 
-def rest(motion: PlatformMotion) -> PlatformMotion:
-    return PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])
-
-
-# --- feedforward ----------------------------------------------------------------------------------
-
-
-def held(node: FeedforwardBench, motion: PlatformMotion) -> np.ndarray:
-    """Return the forces that hold a pose without the effects of the package."""
-    return DriveModel.load().drive_forces(rest(motion)).total[0]
-
-
 @pytest.mark.nodes
-@pytest.mark.parametrize('fault', ['exits', 'longer'])  # test_foreign_effects.py has all
+@pytest.mark.parametrize('fault', ['exits', 'longer'])  # test_user_effects.py has all
 def test_feedforward_rejects_counts_tells_and_goes_on(package: ModuleType, fault: str) -> None:
     with feedforward_bench(**parameters('worn_brake')) as node:
         answer = node.answer(message_of(ONE))
@@ -51,7 +37,7 @@ def test_feedforward_rejects_counts_tells_and_goes_on(package: ModuleType, fault
             assert node.bench.spin_until(lambda silent=silent: len(node.commands) > silent)
             node.bench.spin_for(0.1)
             assert len(node.commands) == silent + 1
-            np.testing.assert_allclose(node.commands[-1].data, held(node, ONE), rtol=0, atol=EQUAL)
+            np.testing.assert_allclose(node.commands[-1].data, held(ONE), rtol=0, atol=EQUAL)
             fail(package, 'nowhere')
             assert node.answer(message_of(ONE)) == answer
             node.wait_for_status(level='OK', code='OK')
@@ -72,7 +58,7 @@ def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: A
         status = node.wait_for_status(level='STALE', code='STALE')
         assert 'the last pose is held at rest, without worn_brake' in status['message']
         assert node.bench.spin_until(lambda: len(node.commands) == 2)
-        np.testing.assert_allclose(node.commands[-1].data, held(node, ONE), rtol=0, atol=EQUAL)
+        np.testing.assert_allclose(node.commands[-1].data, held(ONE), rtol=0, atol=EQUAL)
 
 
 @pytest.mark.nodes

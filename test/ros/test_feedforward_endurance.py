@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.node import fuzz, parameter_storm, soak, stall
+from benchmarks.node import fuzz, parameter_storm, restart, soak, stall
 
 pytestmark = pytest.mark.nodes
 
@@ -20,6 +20,12 @@ def test_no_damage_to_a_message_harms_the_node(ros_domain: int) -> None:
 def test_no_storm_of_parameters_brings_a_model_into_force_that_is_none(ros_domain: int) -> None:
     found = parameter_storm.run(150, seed=3, domain=ros_domain)
     assert parameter_storm.passed(found), found
+
+
+def test_a_node_that_was_killed_in_mid_stream_and_started_again_answers(ros_domain: int) -> None:
+    found = restart.run(2, domain=ros_domain)
+    assert found['kills'] == len(found['start_to_first_command_s']) == 2
+    assert restart.passed(found), found
 
 
 @pytest.mark.slow

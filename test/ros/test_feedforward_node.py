@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,65 +82,35 @@ def test_parts_are_published_while_somebody_listens_and_sum_to_the_command(
 
 # --- messages that break a rule -----------------------------------------------------------------
 
-def empty(m: MultiDOFJointTrajectory) -> None:
-    m.points = []
-
-
-def wrong_name(m: MultiDOFJointTrajectory) -> None:
-    m.joint_names = ['gripper']
-
-
-def foreign_frame(m: MultiDOFJointTrajectory) -> None:
-    m.header.frame_id = 'world'
-
-
-def no_velocity(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].velocities = []
-
-
-def nan_position(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].transforms[0].translation.y = float('nan')
-
-
-def zero_quaternion(m: MultiDOFJointTrajectory) -> None:
-    rotation = m.points[0].transforms[0].rotation
-    rotation.x = rotation.y = rotation.z = rotation.w = 0.0
-
-
-def times_stand_still(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].time_from_start = m.points[0].time_from_start
-
-
-def out_of_reach(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].transforms[0].translation.x = 0.6
-
-
-def absurdly_far(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].transforms[0].translation.x = 1e308
-
-
-def rod_lies_flat(m: MultiDOFJointTrajectory) -> None:
+NAN = float('nan')
+FLAT = {'translation.x': 0.3499, 'translation.y': 0.0, 'translation.z': 0.5, 'rotation.x': 0.0,
+        'rotation.y': 0.0, 'rotation.z': 0.0, 'rotation.w': 1.0}
+# Codes, and what a message has then, by the path of a field.
+DAMAGES: list[tuple[str, dict[str, Any]]] = [
+    ('EMPTY', {'points': []}), ('NAMES', {'joint_names': ['gripper']}),
+    ('FRAME', {'header.frame_id': 'world'}), ('SIZE', {'points.1.velocities': []}),
+    ('NON_FINITE', {'points.1.transforms.0.translation.y': NAN}),
+    ('QUATERNION', {f'points.0.transforms.0.rotation.{axis}': 0.0 for axis in 'xyzw'}),
+    ('TIME', {'points.1.time_from_start.nanosec': 0}),
+    ('WORKSPACE', {'points.1.transforms.0.translation.x': 0.6}),
+    ('WORKSPACE', {'points.0.transforms.0.translation.x': 1e308}),
     # R - A.e = 0.15 - (x + 0.1) = -0.2999 m of the rod's 0.3 m: sin u = 0.026 < 0.05.
-    for point in m.points:
-        pose = point.transforms[0]
-        pose.translation.x, pose.translation.y, pose.translation.z = 0.3499, 0.0, 0.5
-        pose.rotation.x = pose.rotation.y = pose.rotation.z = 0.0
-        pose.rotation.w = 1.0
+    ('SINGULAR', {f'points.{k}.transforms.0.{key}': value for k in (0, 1)
+                  for key, value in FLAT.items()}),
+    ('LIMIT', {'points.1.accelerations.0.linear.z': 1000.0}),
+    ('OUTPUT', {'points.0.velocities.0.angular.x': 1e300})]
 
 
-def force_over_limit(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].accelerations[0].linear.z = 1000.0
-
-
-def overflow_in_the_model(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].velocities[0].angular.x = 1e300
-
-
-DAMAGES: list[tuple[str, Callable[[MultiDOFJointTrajectory], None]]] = [
-    ('EMPTY', empty), ('NAMES', wrong_name), ('FRAME', foreign_frame), ('SIZE', no_velocity),
-    ('NON_FINITE', nan_position), ('QUATERNION', zero_quaternion), ('TIME', times_stand_still),
-    ('WORKSPACE', out_of_reach), ('WORKSPACE', absurdly_far), ('SINGULAR', rod_lies_flat),
-    ('LIMIT', force_over_limit), ('OUTPUT', overflow_in_the_model)]
+def damaged(good: MultiDOFJointTrajectory, fields: dict[str, Any]) -> MultiDOFJointTrajectory:
+    """Return a copy of a message with other values in some of its fields."""
+    message = copy.deepcopy(good)
+    for path, value in fields.items():
+        *way, last = path.split('.')
+        part: Any = message
+        for step in way:
+            part = part[int(step)] if step.isdigit() else getattr(part, step)
+        setattr(part, last, value)
+    return message
 
 
 def test_damaged_messages_are_counted_explained_silent_and_survived(
@@ -147,20 +118,18 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
 ) -> None:
     running, good = feedforward.bench, message_of(random_motion(np.random.default_rng(3), 2))
     answer = feedforward.answer(good)
-    for code, damage in DAMAGES:
-        message = copy.deepcopy(good)
-        damage(message)
+    for code, fields in DAMAGES:
         counters, silent = dict(feedforward.node._counters), len(feedforward.commands)
-        feedforward.send(message)
+        feedforward.send(damaged(good, fields))
         expected = {**counters, 'received': counters['received'] + 1, code: counters[code] + 1}
-        assert feedforward.node._counters == expected, damage.__name__
+        assert feedforward.node._counters == expected, fields
         assert running.spin_until(lambda code=code: running.status[-1]['code'] == code)
         assert running.status[-1]['counters'][code] >= 1
         assert running.status[-1]['level'] == 'ERROR'
         assert running.status[-1]['message']
         # Both topics come from one publisher thread: the next valid answer is the next command.
         assert feedforward.answer(good) == answer
-        assert len(feedforward.commands) == silent + 1, damage.__name__
+        assert len(feedforward.commands) == silent + 1, fields
     assert all(np.isfinite(command.data).all() for command in feedforward.commands)
     # EFFECT is no message's fault: test_failing_effects.py
     assert {code for code in REJECTIONS if not feedforward.counters[code]} == {'EFFECT'}

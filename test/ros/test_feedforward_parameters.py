@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from model_recordings import with_effects
 from node_bench import bench, overrides
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, SetParameters
@@ -64,11 +65,9 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
     assert caller.set('effects.effort_offset.slide_3.force', -0.7).successful
     assert node.answer(MESSAGE) == plain.tolist()
     assert caller.set('effects.active', ['stribeck_friction', 'effort_offset']).successful
-    values = {**DriveModel.load().values, 'effects.active': ['stribeck_friction', 'effort_offset'],
-              'effects.stribeck_friction.lift_1.force': 1.2,
-              'effects.stribeck_friction.lift_1.velocity': 0.01,
-              'effects.effort_offset.slide_3.force': -0.7}
-    expected = DriveModel.from_parameters(values).drive_forces(MOTION)
+    expected = with_effects(DriveModel.load(), {
+        'stribeck_friction': {'lift_1.force': 1.2, 'lift_1.velocity': 0.01},
+        'effort_offset': {'slide_3.force': -0.7}}).drive_forces(MOTION)
     topic = '/feedforward/effort/effort_offset'
     part = node.bench.listen(JointState, topic)
     assert node.bench.spin_until(lambda: node.node.count_subscribers(topic))

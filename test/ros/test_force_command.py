@@ -10,6 +10,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from model_recordings import with_effects
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import WorkspaceError
@@ -21,12 +22,9 @@ from pprs_dynamics.ros.messages.trajectory_request import Timing, TrajectoryRequ
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject', 'ramp_time': 0.0}
 MODEL = DriveModel.load()
-REMEMBERS = DriveModel.from_parameters(
-    {**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
-                         **{f'effects.hysteresis.slide_1.{key}': value for key, value in {
-                             'force': 3.0, 'distance': 0.005}.items()},
-                         **{f'effects.friction_drift.slide_1.{key}': value for key, value in {
-                             'force': 5.0, 'time': 0.1}.items()}})
+REMEMBERS = with_effects(MODEL, {
+    'hysteresis': {'slide_1.force': 3.0, 'slide_1.distance': 0.005},
+    'friction_drift': {'slide_1.force': 5.0, 'slide_1.time': 0.1}})
 HEAVY = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 3.0})
 STEP = 10_000_000  # [ns]
 

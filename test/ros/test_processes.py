@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,14 +13,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from feedforward_bench import message_of, random_motion
 from node_bench import Bench, bench
-from ros_processes import environment, executable
+from rcl_interfaces.srv import ListParameters
+from rclpy.parameter import Parameter
+from ros_processes import environment, executable, node_process
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages.trajectory_request import TRAJECTORY, readers_for
+from pprs_dynamics.ros.monitor import MonitorNode
 from pprs_dynamics.simulation.motion_files import write_motion
 
 pytestmark = pytest.mark.nodes
@@ -115,3 +123,69 @@ def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None
     assert done.returncode == 2
     assert done.stderr.strip().startswith('feedforward needs ROS 2: source an installation')
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+# A node that speaks to a machine takes no other robot's model for it by itself.
+
+@pytest.mark.parametrize('node', ['feedforward', 'monitor'])
+def test_without_a_model_it_does_not_start_and_says_what_to_write(
+    node: str, ros_domain: int,
+) -> None:
+    done = subprocess.run([executable(node)], env=environment(ros_domain), capture_output=True,
+                          text=True, timeout=60)
+    assert done.returncode == 2
+    said = done.stderr.strip().splitlines()[-1]
+    assert said.startswith(f'{node} was given no model')
+    assert '--params-file FILE' in said
+    assert 'demo:=true' in said
+
+
+@pytest.mark.parametrize(('kind', 'given'), [
+    (FeedforwardNode, {}), (FeedforwardNode, {'masses.payload': 2.0}),
+    (MonitorNode, {'demo': False})])
+def test_changes_of_the_papers_robot_are_no_model(kind: type, given: dict[str, object]) -> None:
+    with bench() as running, pytest.raises(PprsError, match='given no model'):
+        running.add(kind, parameter_overrides=[
+            Parameter(name, value=value) for name, value in given.items()])
+
+
+def test_a_demonstration_stays_one() -> None:
+    with bench() as running:
+        node = running.add(FeedforwardNode, parameter_overrides=[Parameter('demo', value=True)])
+        answer, = node.set_parameters([Parameter('demo', value=False)])
+        assert not answer.successful
+
+
+# A node whose equations are not compiled yet answers, and goes on while they are compiled.
+
+ONE_POSE = random_motion(np.random.default_rng(8), 1)
+
+
+@pytest.mark.nodes
+def test_a_node_without_compiled_kernels_answers_messages_and_services(
+    ros_domain: int, tmp_path: Path,
+) -> None:
+    log = tmp_path / 'log'
+    cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache')}
+    command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true', '-p', 'max_age:=0.0',
+               '-p', 'command_timeout:=0.0']
+    with bench() as running, node_process(command, ros_domain, log, cold) as process:
+        commands = running.listen(Float64MultiArray, '/feedforward/commands')
+        running.follow_status('/feedforward/status')
+        publisher = running.probe.create_publisher(
+            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
+        client = running.probe.create_client(ListParameters, '/feedforward/list_parameters')
+        assert running.spin_until(publisher.get_subscription_count, 20), log.read_text()
+        assert running.connected()
+        publisher.publish(message_of(ONE_POSE))
+        asked = client.call_async(ListParameters.Request())
+        assert running.spin_until(lambda: commands and asked.done(), 20)
+        assert running.status[-1]['preparing'] is True
+        np.testing.assert_allclose(
+            commands[0].data, DriveModel.load().drive_forces(ONE_POSE).total[0], rtol=0, atol=EQUAL)
+        # Stopped in the middle of it, it ends as ever.
+        cache = tmp_path / 'cache'
+        assert running.spin_until(lambda: cache.is_dir() and os.listdir(cache), 30)
+        process.terminate()
+        assert process.wait(10) == 0
+    assert 'Traceback' not in log.read_text()

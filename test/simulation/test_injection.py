@@ -13,6 +13,7 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
+from model_recordings import with_effects
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
@@ -61,8 +62,7 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: DriveModel) -> None:
     engine = MechanismEngine(model)
     before = engine.torques(motion)
     engine.carry(model.robot.structure.tool, body_at(1.5, (0.0, 0.0, 0.0), np.zeros((3, 3))))
-    loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['payload_mass'],
-                          'effects.payload_mass.mass': 1.5}, model.source)
+    loaded = with_effects(model, {'payload_mass': {'mass': 1.5}})
     assert engine.torques(motion) - before == pytest.approx(
         loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
 
@@ -217,26 +217,26 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
         values |= {'x': 0.0, 'y': 0.0, 'z': 0.05}
     else:
         values = dict.fromkeys(('force_x', 'force_y'), 0.0) | values
-    lacking = DriveModel.from_parameters({
-        **model.values, 'effects.active': [kind],
-        **{f'effects.{kind}.{key}': value for key, value in values.items()}}, model.source)
+    lacking = with_effects(model, {kind: values})
     exact = lacking.drive_forces(motion).total - model.drive_forces(motion).total
     noise = 0.005 * np.abs(run.efforts).max(axis=0)
     assert np.all(np.sqrt(np.mean((added - exact) ** 2, axis=0)) < 0.01 * noise)
     assert np.all(np.sqrt(np.mean(exact ** 2, axis=0)) > noise)
 
 
-def test_a_payload_of_a_3_pprs_is_at_the_centre_of_mass_of_platform_and_payload() -> None:
-    plain = plain_platform()
-    run = Injection(plain, [named('payload_mass', np.random.default_rng(1), 1.0)],
-                    np.random.default_rng(2))
-    heavier = DriveModel.from_parameters({
-        **PLATFORM.values, 'effects.active': ['payload_mass'],
-        'effects.payload_mass.mass': run.truths[0]['parameters']['mass']})
-    motion = Excitation(seed=3).motion(np.arange(300) / 100)
-    exact = heavier.drive_forces(motion).total - PLATFORM.drive_forces(motion).total
-    error = run.efforts - plain.effort - exact
-    assert np.all(error.std(axis=0) < 0.01 * exact.std(axis=0))
+@pytest.mark.parametrize('name', ['payload_mass', 'payload_offset'])
+def test_an_injected_load_of_a_3_pprs_is_that_of_the_effect_of_its_name(name: str) -> None:
+    values = {**PLATFORM.values, 'friction.drives.coulomb': (0.0,) * 6,
+              'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
+    model, motion = DriveModel.from_parameters(values), Excitation(seed=3).motion(
+        np.arange(300) / 100)
+    state = model.mechanism(motion)
+    plain = PlainRobot(as_mechanism(model), JointMotion(
+        state.position, state.velocity, state.acceleration, motion.time))
+    run = Injection(plain, [named(name, np.random.default_rng(1), 1.0)], np.random.default_rng(2))
+    other = with_effects(model, {name: run.truths[0]['parameters']})
+    exact = other.drive_forces(motion).total - model.drive_forces(motion).total
+    assert run.efforts - plain.effort == pytest.approx(exact, abs=1e-8)
 
 
 def test_given_drives_have_the_effect() -> None:

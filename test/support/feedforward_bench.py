@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
-from pprs_dynamics import PlatformMotion
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
 
@@ -116,6 +116,11 @@ def random_motion(rng: np.random.Generator, points: int) -> PlatformMotion:
         Rotation.from_rotvec(rng.uniform(-0.15, 0.15, (points, 3))).as_quat(),
         *(rng.normal(scale=0.5, size=(points, 3)) for _ in range(4)),
         np.arange(points) * 0.01)
+
+
+def held(motion: PlatformMotion) -> np.ndarray:
+    """Return the forces of the demonstration's robot at rest in the last pose of a motion."""
+    return DriveModel.load().drive_forces(motion[-1:].held()).total[0]
 
 
 def message_of(motion: PlatformMotion, stamp: Time | None = None) -> MultiDOFJointTrajectory:

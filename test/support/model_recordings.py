@@ -41,4 +41,4 @@ def with_effects(model: DriveModel, effects: dict[str, dict[str, float]],
                 for key, value in of_effect.items()}
     return DriveModel.from_parameters(
         {**model.values, 'effects.active': list(effects), **flat('effects', effects),
-                        **flat('uncertainties', uncertainties or {})})
+         **flat('uncertainties', uncertainties or {})}, model.source)

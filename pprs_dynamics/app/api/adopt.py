@@ -7,33 +7,67 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pprs_dynamics.app.api.diagnose import DiagnosisResult
 from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report.adoption_report import adoption_page, adoption_view, run_view
+from pprs_dynamics.app.api.result import Result
+from pprs_dynamics.app.report.figures import (
+    add_contributions,
+    add_every_drive,
+    before_and_after,
+    curve_with_band,
+)
 from pprs_dynamics.app.report.history_report import history_page
-from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
+from pprs_dynamics.app.report.terminal import escape, shell_command, stacked, verdict_panel
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
 from pprs_dynamics.inference.adoption.adopt import original
-from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
+from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.loop import AMBIGUOUS, REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
-from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base, require_open_numbers
+from pprs_dynamics.inference.diagnosis.quantities import (
+    as_fitted,
+    in_unit,
+    plain,
+    with_drives,
+    with_uncertainty,
+)
+from pprs_dynamics.inference.diagnosis.sentences import sure_moments
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
-from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure
+    from pprs_dynamics.app.api.result import Figure
+
+MOST_SHOWN = 6  # values without --details
+MOST_REMARKS = 2
+
+
+def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
+    """Return each parameter that is not 0, and its value ± two standard deviations.
+
+    With first moments of bodies that are sure where the mass is not.
+    """
+    effect = answer.request.effect
+    scales = {parameter.name: parameter.scale for parameter in effect.parameters}
+    rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
+                            scales.get(effect.place_and_parameter(key)[1], inf)))
+            for key, parameter in answer.parameters.items() if parameter.value != 0.0]
+    return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
+        (told.name, answer.moments[told.name])
+        for told in sure_moments(effect, answer.parameters, answer.moments))]
 
 
 class RefusedError(PprsError, ValueError):
@@ -52,6 +86,7 @@ class AdoptionResult(Result):
         The answer with all that it was decided from.
     """
 
+    rows = 'parameters'  # what `table` shows
     inputs: Inputs
     adoption: Adoption
 
@@ -88,21 +123,87 @@ class AdoptionResult(Result):
         """Return what `pprs adopt --json` writes."""
         return self.adoption.to_dict()
 
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows."""
-        return adoption_view(self.adoption)
+    @property
+    def headline(self) -> str:
+        """The answer in a sentence."""
+        answer = self.adoption
+        what = with_drives(answer.effect, answer.drives, answer.before.drives)
+        said = ('is refused' if not answer.adopted else
+                'is adopted by force, in spite of this' if answer.forced else 'is adopted')
+        return f'{what} {said}: {answer.reason}.'
+
+    @property
+    def _held_out(self) -> str:
+        return ('held-out recordings' if self.adoption.held_out_on == VALIDATION
+                else 'held-out blocks')
+
+    def view(self) -> Any:
+        """Return answer, fall of the error and first values for the terminal, in 20 lines."""
+        answer = self.adoption
+        word, colour = (('refused', 'red') if not answer.adopted else
+                        ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
+        errors = [f'  error on {label}: {plain(before)} → {plain(after)} {answer.unit}'
+                  for label, before, after in (
+                      ('recordings', answer.error_before, answer.error_after),
+                      (self._held_out, answer.held_out_before, answer.held_out_after))]
+        rows = parameter_rows(answer)
+        more = [f'  … and {len(rows) - MOST_SHOWN} more, with --json or --report']
+        return stacked(
+            verdict_panel(word, colour, self.headline), *errors,
+            f'  noise: {in_unit(answer.noise_floor, answer.unit)}',
+            *(f'  {escape(key)} = {escape(text)}' for key, text in rows[:MOST_SHOWN]),
+            *more[:len(rows) > MOST_SHOWN],
+            *(f'[yellow]![/] {escape(remark)}' for remark in answer.remarks[:MOST_REMARKS]))
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
-        return adoption_page(self.adoption, self.inputs.fitted, self.inputs.held_out,
-                             replace(self.inputs.files, model=saved_as).command(
-                                 'diagnose', held_out=True))
-
-    def table(self) -> DataFrame:
-        """Return a row per parameter: its value, std and unit."""
-        found = self.adoption.parameters
-        return data_frame([{'value': entry.value, 'std': entry.std, 'unit': entry.unit}
-                           for entry in found.values()], list(found), 'parameter')
+        answer = self.adoption
+        before, after = answer.residuals_before, answer.residuals_after
+        page = Page(f'{answer.effect}: ' + ('added to the model' if answer.adopted else 'refused'))
+        page.text(self.headline, 'lead')
+        page.sources(answer.before.source, *self.inputs.names)
+        errors, fallen = rms_by_drive(before), rms_by_drive(after)
+        with page.columns():
+            page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
+                                  answer.noise_floor),
+                         ErrorRow(self._held_out, answer.held_out_before, answer.held_out_after,
+                                  answer.noise_floor),
+                         *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
+                           for name in errors)],
+                        f'Error on the recordings, rms [{answer.unit}], before (grey) and with the '
+                        'effect (blue); dotted: the noise.')
+            most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name],
+                       default='')
+            if most:
+                page.figure(before_and_after(before, after, before.drives.index(most),
+                                             answer.noise_floors[most]),
+                            f'{most}, where the error falls most: effort and error.',
+                            over_time=True)
+        if answer.curve is not None:
+            page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
+                        'and the residual of the model without it. It is a correction table, not a '
+                        'cause. Beyond the measured range it is constant.')
+        if answer.adopted:
+            page.command('Look for further effects', replace(
+                self.inputs.files, model=saved_as).command('diagnose', held_out=True))
+        page.bullets(answer.remarks)
+        if answer.parameters:
+            page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
+                       caption='Fitted values')
+        forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
+                  if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
+        if any(np.any(force) for force in forces.values()):
+            with page.fold('Contribution of each added effect'):
+                add_contributions(page, after, forces, 'Contribution of each added effect.')
+        add_every_drive(page, before, after, answer.noise_floors,
+                        f'before and with {answer.effect}')
+        if answer.calibrated:
+            with page.fold('Numbers of the model that changed within their tolerances'):
+                page.table(('number', 'before', 'after'),
+                           [(number.label, with_uncertainty(number.before, 0.0, number.unit),
+                             with_uncertainty(number.after, number.std, number.unit))
+                            for number in answer.calibrated])
+        return page
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after, and the noise."""
@@ -119,19 +220,15 @@ class AdoptionRunResult(Result):
         Model and recordings.
     run : AdoptionRun
         What was adopted and refused, one after the other.
-    refit : BaseFit, optional
-        Of the base model with the adopted effects.
     """
 
+    rows = 'steps'  # what `table` shows
     inputs: Inputs
     run: AdoptionRun
-    refit: BaseFit | None = None
 
     @property
     def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
-        if self.refit is not None and self.refit.ratio < 1:
-            return self.refit.model
         return self.run.model
 
     @property
@@ -155,27 +252,21 @@ class AdoptionRunResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        refit = {} if self.refit is None else {'refit': {
-            **self.refit.to_dict(), 'taken': self.refit.ratio < 1, 'reason': self.refit.change}}
-        return {**self.run.to_dict(), **refit}
+        return self.run.to_dict()
 
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows."""
-        return run_view(self.run, self.inputs.files.command(
-            'next-experiment', '--output', 'next.csv'), details)
+    def view(self) -> Any:
+        """Return adopted and refused effects, and the reason to end, for the terminal."""
+        following = [shell_command(self.inputs.files.command(
+            'next-experiment', '--output', 'next.csv'))] if self.run.ended == AMBIGUOUS else []
+        return stacked(
+            *(escape(AdoptionResult(self.inputs, step).headline) for step in self.run.steps),
+            f'[bold]{self.run.ended}[/]: {escape(self.run.reason)}{":" * len(following)}',
+            *following)
 
     def page(self) -> Page:
         """Return the page of `pprs history --report` of the model."""
         return history_page('the adopted model', read_steps(self.model.values),
                             common_effort(self.model.units))
-
-    def table(self) -> DataFrame:
-        """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
-        return data_frame([
-            {'effect': step.effect, 'adopted': step.adopted, 'error_before': step.error_before,
-             'error_after': step.error_after, 'held_out_before': step.held_out_before,
-             'held_out_after': step.held_out_after, 'reason': step.reason}
-            for step in self.run.steps])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before all, after all, and the noise.
@@ -235,18 +326,15 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
 
 
 def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *,
-              refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
+              diagnosis: DiagnosisResult | None = None,
               topic: str | None = None, progress: Progress | None = None,
               reference: Given | None = None) -> AdoptionRunResult:
-    """Diagnose and adopt until no effect is missing.
+    """Diagnose once, and adopt the reported effects.
 
     Parameters
     ----------
     model, recordings, validate, diagnosis, topic, progress, reference
         As in `adopt`.
-    refit : path, Recording, or a sequence of them, optional
-        To which the base model is then fitted again, as `fit` does, with the adopted effects. It is
-        taken if the error on other data falls. An empty sequence means `recordings`.
 
     Returns
     -------
@@ -254,25 +342,14 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
 
     Raises
     ------
-    FitError
-        Where there is nothing to fit again.
     PprsError
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
     inputs = inputs.since(reference, original(inputs.model))
-    again: list[Recording] = []
-    if refit is not None:
-        require_open_numbers(inputs.model)
-        again = Inputs.of(inputs.model, refit, inputs.held_out, topic,
-                          progress, as_it_is=inputs.as_it_is).fitted or inputs.fitted
-    run = adopt_effects(
+    return AdoptionRunResult(inputs, adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
-        None if diagnosis is None else diagnosis.diagnosis, inputs.reference)
-    if not again or not run.adopted:
-        return AdoptionRunResult(inputs, run)
-    return AdoptionRunResult(inputs, run, fit_base(
-        run.model, again, inputs.held_out, stage(progress, 'fitting the base')))
+        None if diagnosis is None else diagnosis.diagnosis, inputs.reference))
 
 
 def _plot(first: Adoption, last: Adoption) -> Figure:

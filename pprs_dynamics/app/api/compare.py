@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report.comparison_report import comparison_page, comparison_view
-from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report import figures
+from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors, plot_series
+from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
+from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
@@ -31,6 +33,10 @@ from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
+
+NOWHERE = 'The error is not concentrated in any region.'
+FIRST = 3  # statements in the terminal, and on the first screen of the page
+COLOURS = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -79,14 +85,103 @@ class ComparisonResult(Result):
                        recording.findings for recording in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows."""
-        return comparison_view(self.comparison, self._next, details, self.beside)
+    def _drives(self) -> PlainTable:
+        """Return the numbers of every drive; the grade comes last."""
+        comparison, beside = self.comparison, self.beside
+        headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise')
+        # One unit for all: names of joints need the room.
+        marked = ('rms',) if len(comparison.unit) > 1 else ('rms', 'bias', 'peak', 'noise')
+        return ('drive', *(f'{name} [{comparison.unit}]' if name in marked else name
+                           for name in headings),
+                *(['rms, other'] if beside else []), 'grade'), [
+            (name, plain(drive.rms), percent(drive.relative),
+             rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
+             percent(drive.explained_variance),
+             '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
+             *([plain(beside.drives[name]) if name in beside.drives else 'none'] if beside else []),
+             drive.grade)
+            for name, drive in comparison.drives.items()]
+
+    def view(self) -> Any:
+        """Return how wrong the model is, where, and what to do next, for the terminal."""
+        headings, rows = self._drives()
+        table = text_table(headings[:-1], [
+            (f'[{COLOURS[row[-1]]}]{escape(row[0])}[/]', *row[1:-1]) for row in rows],
+            frame='none')
+        lines = [f'{number}. {escape(statement.text)}'
+                 for number, statement in enumerate(self.where, start=1)]
+        parts = [table, escape(self.verdict), *(lines[:FIRST] or [NOWHERE])]
+        if len(lines) > FIRST:
+            parts.append(f'… and {len(lines) - FIRST} more, with --json or --report')
+        if self.beside is not None:
+            parts.append(f'Other: {escape(self.beside.name)}, rms {plain(self.beside.rms)} '
+                         f'instead of {plain(self.rms)} {self.comparison.unit}')
+        if self.comparison.is_beyond_noise:
+            words, command = self._next
+            parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]
+        return stacked(*parts)
 
     def page(self) -> Page:
-        """Return the page of `pprs compare --report`."""
-        return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
-                               self.comparison, self.notes, self._next, self.beside)
+        """Return the page of `pprs compare --report`: where it fails first, the rest folded."""
+        comparison, residuals, beside = self.comparison, self.residuals, self.beside
+        recordings, statements = self.inputs.fitted, self.where
+        page = Page('Model against measurement')
+        page.text(self.verdict, 'lead')
+        page.sources(self.inputs.model.source, *self.inputs.names)
+        with page.columns():
+            with page.block():
+                page.errors([ErrorRow(name, drive.rms, beside.drives.get(name) if beside else None,
+                                      drive.noise_floor)
+                             for name, drive in comparison.drives.items()],
+                            f'Error, rms [{comparison.unit}]; dotted: the noise.'
+                            + (f' Second bar: {beside.name}.' if beside else ''))
+                if statements:
+                    page.bullets([statement.text for statement in statements[:FIRST]],
+                                 numbered=True)
+                else:
+                    page.text(NOWHERE)
+            if statements:
+                noise = comparison.localisation.noise.get(statements[0].drive)
+                picture = noise and figures.along(residuals, noise, statements[0], 'error')
+                if picture is not None:
+                    page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '
+                                'standard deviations under the noise.')
+        if comparison.is_beyond_noise:
+            page.command(*self._next)
+        page.folded_list(f'{len(statements) - FIRST} more places',
+                         [statement.text for statement in statements[FIRST:]])
+        with page.fold('Drive by drive'):
+            page.table(*self._drives(), [drive.grade for drive in comparison.drives.values()])
+        with page.fold('Over time'):
+            page.text('Drag to zoom, on all drives at once; double-click to return. No peak is '
+                      'lost by thinning.', 'note')
+            for drive, name in enumerate(residuals.drives):
+                if name in comparison.drives:
+                    page.figure(figures.over_time(residuals, drive),
+                                f'{name}: effort, model and their difference.', over_time=True)
+        names = list(comparison.drives)
+        with page.fold('Error over other variables'):
+            page.text('Mean error over bins, with two standard deviations under noise that is '
+                      'correlated in time.', 'note')
+            page.menu('Drive', names, self._worst)
+            with page.columns():
+                for figure, caption in figures.against_variables(residuals, comparison):
+                    page.figure(figure, caption)
+        with page.fold('Spectrum of the error'):
+            page.menu('Drive', names, self._worst)
+            page.figure(figures.spectrum(residuals, comparison),
+                        'Power of the error and of the noise.')
+        page.folded_list('Method', self.notes)
+        page.folded_list('Faults of the recordings', [
+            f'{recording.name}: {finding.text}' for recording in recordings
+            for finding in recording.findings])
+        return page
+
+    @property
+    def _worst(self) -> str:
+        """Drive of which the model explains least."""
+        drives = self.comparison.drives
+        return max(drives, key=lambda name: drives[name].unexplained)
 
     def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> None:
         """Write measured effort, model, parts and residual as a bag, .mcap or .db3.
@@ -102,11 +197,10 @@ class ComparisonResult(Result):
 
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
-        drives = self.comparison.drives
-        return data_frame([{'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias,
-                            'peak': drive.peak, 'noise': drive.noise_floor, 'grade': drive.grade,
-                            'unit': drive.unit} for drive in drives.values()],
-                          list(drives), 'drive')
+        return data_frame({name: {
+            'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias, 'peak': drive.peak,
+            'noise': drive.noise_floor, 'grade': drive.grade, 'unit': drive.unit}
+            for name, drive in self.comparison.drives.items()})
 
     def plot(self) -> Figure:
         """Return a picture: error and noise of every drive, and the worst drive over time."""
@@ -116,8 +210,8 @@ class ComparisonResult(Result):
              'noise': {name: drive.noise_floor for name, drive in drives.items()
                        if drive.noise_floor is not None}},
             self.comparison.unit, rows=2)
-        worst = max(drives, key=lambda name: drives[name].unexplained)
-        d, residuals = self.residuals.drives.index(worst), self.residuals
+        worst, residuals = self._worst, self.residuals
+        d = residuals.drives.index(worst)
         plot_series(figure.axes[1], residuals.time,
                     {'measured': residuals.measured[:, d],
                      'measured minus model': residuals.error[:, d]},

@@ -5,33 +5,344 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.api.inputs import (
-    Given,
-    Inputs,
-    Model,
-    Progress,
-    Recordings,
-    stage,
-)
+from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
-from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report import figures
+from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
+from pprs_dynamics.app.report.terminal import (
+    PlainTable,
+    escape,
+    plain_rows,
+    shell_command,
+    stacked,
+    text_table,
+    titled_table,
+    verdict_panel,
+)
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import listed
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
+from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain
+from pprs_dynamics.inference.diagnosis.sentences import (
+    Finding,
+    Sentences,
+    detectable_rows,
+    fitted_values,
+    runner_up,
+    set_rows,
+    unexplained_groups,
+    word_detectable,
+    word_diagnosis,
+)
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.residuals import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
+
+COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
+MOST_EFFECTS = 4  # rows and values without --details
+MOST_PLACES = 2  # of an unexplained error without --details
+REFIT = 'numbers of the model'  # fitted together with the effects
+LEAST_REFIT = 0.01  # share of the error, from which these are listed
+EVERYWHERE = 'structure'  # where effects sit that are not on drives
+ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
+METHOD = (
+    'Model and measured effort are filtered alike. Every effect of the catalogue is a column of '
+    'one regression, in each shape and on each drive, together with the free numbers of the model.',
+    'Sets of effects are compared by one cost: the penalised deviance under noise that is '
+    'correlated in time, plus prior penalties. The spectrum of the noise is fitted for each set. '
+    'The evidence of an effect is the cost of the best set without it minus the cost of the '
+    'reported set.')
+
+TitledTable = tuple[str, str, PlainTable]
+"""Title, note, and headings with rows."""
+
+
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
+                   next_step: bool = True) -> Any:
+    """Return the diagnosis for the terminal, most important first.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    words : Sentences
+        The diagnosis in words.
+    details : bool
+        Everything, instead of at most 25 lines of 80 columns.
+    next_step : bool
+        Whether the next command is printed.
+    """
+    parts = [verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline),
+             *(f'[blue]i[/] {escape(text)}' for text in words.reference),
+             *(_details if details else _brief)(diagnosis, words)]
+    if next_step:
+        parts.append(f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}')
+        parts += [shell_command(words.command)] if words.command else []
+    return stacked(*parts, *(() if details else (ELSEWHERE,)))
+
+
+def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield the first effects with their values, the runner-up and the first warning."""
+    if diagnosis.effects:
+        rows, values = effect_rows(diagnosis), value_rows(diagnosis)
+        yield _effects_table(diagnosis, rows[:MOST_EFFECTS], frame='none')
+        for effect, drive, text in values[:MOST_EFFECTS]:
+            yield escape(f'  {f"{effect} on {drive}" if drive else effect}: {text}')
+        if len(rows) > MOST_EFFECTS or len(values) > MOST_EFFECTS:
+            yield f'  … all {len(rows)} rows and {len(values)} lines of values: --details'
+    for statement in diagnosis.depends_on[:MOST_PLACES]:
+        yield escape(f'  {statement.text}')
+    if second := runner_up(diagnosis):
+        yield f'[bold]Runner-up[/] {escape(second)}'
+    if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
+        yield escape(seen)
+    if words.barred:
+        yield f'[blue]i[/] {escape(words.barred[0])}'
+    if words.warnings:
+        yield f'[yellow]![/] {escape(words.warnings[0])}'
+
+
+def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield every effect, finding, table and list."""
+    if diagnosis.effects:
+        yield _effects_table(diagnosis, effect_rows(diagnosis), frame='head',
+                             title=_held_out(diagnosis))
+    for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
+        yield f'[bold]{number}. {escape(finding.title)}[/]'
+        yield _labelled([*finding_lines(finding), ('confirm', finding.confirm)], 8)
+        yield ''
+    for title, note, table in (*_values(diagnosis), *_alternatives(diagnosis), *_unseen(diagnosis)):
+        yield titled_table(title, table, right=())
+        yield f'[dim]{escape(note)}[/]'
+    for title, lines in (*_lists(words), ('Warnings', words.warnings)):
+        if lines:
+            yield f'[bold]{title}[/]'
+            yield from (_labelled([('-', line)], 1) for line in lines)
+            yield ''
+
+
+def _effects_table(diagnosis: Diagnosis, rows: Sequence[Sequence[str]], **options: Any) -> Any:
+    return text_table(*plain_rows((_headings(diagnosis), rows)), right=(2, 3, 4),
+                      whole=(0, 2, 3, 4), **options)
+
+
+def _values(diagnosis: Diagnosis) -> Iterator[TitledTable]:
+    if rows := value_rows(diagnosis):
+        yield ('Values', 'Intervals are two standard deviations.',
+               (('effect', 'drive', 'values'), rows))
+
+
+def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
+    if diagnosis.sets:
+        yield ('The best sets of effects, and their costs above the best',
+               'A cost of 10 is odds of 150 to 1. Terms: fit = misfit; coefficients = prior; '
+               'others = model choices.',
+               (('cost', 'set', 'terms'),
+                [(cost, text, why) for text, cost, why in set_rows(diagnosis)]))
+    if diagnosis.candidates:
+        yield ('Each effect alone', 'An evidence of 0 is the threshold.',
+               (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
+                [(candidate.name, f'{candidate.evidence:.0f}', plain(candidate.error_after),
+                  sites(candidate.names[0][1], diagnosis)) for candidate in diagnosis.candidates]))
+
+
+def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
+    if rows := detectable_rows(diagnosis):
+        yield ('Smallest effects that would have been reported', 'Each alone would have cost 10 '
+               'less than the answer at the noise of these recordings.',
+               (('effect', 'size'), rows))
+
+
+def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
+    return [('Suspects, which slow noise explains as well', words.suspects),
+            ('Excluded sets', words.barred),
+            ('Calibrated within their tolerance', words.calibrated)]
+
+
+def _held_out(diagnosis: Diagnosis) -> str:
+    return 'Effects by error reduction; held out: ' + (
+        'the --validate recordings' if diagnosis.held_out_on == 'validation'
+        else 'blocks of the same recordings')
+
+
+def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    unit = diagnosis.residuals.unit
+    return ('effect', 'on', f'error [{unit}]', f'held out [{unit}]', 'evidence')
+
+
+def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Return a row for each reported effect, and one for the model's numbers if they matter."""
+    rows: list[tuple[str, ...]] = [
+        (effect.name, sites(effect.drives, diagnosis, effect.places),
+         _fall(effect.error_before, effect.error_after),
+         _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+        for effect in diagnosis.effects]
+    given = root_mean_square(diagnosis.residuals.error)
+    if abs(diagnosis.refit - given) > LEAST_REFIT * given:
+        rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))
+    return rows
+
+
+def _fall(before: float, after: float) -> str:
+    return f'{plain(before)} → {plain(after)}'
+
+
+def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return effect, drive and fitted values, a row for each effect and drive."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for value in fitted_values(diagnosis):
+        rows.setdefault((value.effect, value.drive), []).append(
+            f'{value.parameter.symbol} {value.text}')
+    return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
+
+
+def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
+    """Return lines of text, each after its label."""
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(style='bold', width=width)
+    grid.add_column(ratio=1)
+    for label, text in lines:
+        grid.add_row(label, escape(text))
+    return grid
+
+
+def finding_lines(finding: Finding) -> list[tuple[str, str]]:
+    """Return labelled lines of a finding, without the test that confirms it."""
+    return [('missing', finding.what), ('why', finding.why), ('cause', finding.cause),
+            *(('note', remark) for remark in finding.remarks)]
+
+
+def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
+          places: Sequence[Sequence[str]] = ()) -> str:
+    """Return where an effect sits, for a table."""
+    if places:
+        return listed([listed(names, 'or') for names in places])
+    return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
+
+
+def diagnosis_page(
+    diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
+    validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
+) -> Page:
+    """Return the page: the result on one screen, then evidence, confirmation and alternatives.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    words : Sentences
+        Of it.
+    after : Residuals
+        Of `diagnosis.adopted` on the same recordings.
+    recordings, validation : sequence of str
+        Names of those fitted, and of those held out.
+    rivals : sequence of RivalEffect
+        As they were given to `word_diagnosis`.
+    """
+    page = Page(f'Diagnosis: {diagnosis.verdict}')
+    page.heading('Result')
+    page.text(words.headline, 'lead')
+    for text in words.reference:
+        page.text(f'{text[:1].upper()}{text[1:]}.')
+    page.sources(diagnosis.model.source, recordings, validation)
+    with page.columns():
+        _errors(page, diagnosis, after)
+        _first_picture(page, diagnosis)
+    page.command(words.following, words.command)
+    page.folded_list('Warnings', words.warnings, is_open=True)
+    suspects, barred, calibrated = _lists(words)
+    page.heading('Evidence')
+    for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
+        with page.fold(finding.title):
+            _card(page, diagnosis, finding, effect, diagnosis.remaining)
+    _unexplained(page, diagnosis, words)
+    if diagnosis.effects:
+        with page.fold('Contribution of each effect'):
+            page.table(_headings(diagnosis), effect_rows(diagnosis),
+                       caption=f'{_held_out(diagnosis)}.')
+            figures.add_contributions(page, diagnosis.residuals, {
+                effect.name: effect.force for effect in diagnosis.effects},
+                'Contribution of each effect.')
+    figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,
+                            'with the input model and with the reported effects')
+    _add_tables(page, _values(diagnosis))
+    page.folded_list(*calibrated)
+    if confirmations := [f'{finding.title}: {finding.confirm}'
+                         for finding in (*words.effects, *words.rivals, *words.unexplained)]:
+        page.heading('Confirm it on the machine')
+        page.bullets(confirmations)
+    page.heading('Alternatives')
+    for finding, rival in zip(words.rivals, rivals, strict=True):
+        with page.fold(f'Rival: {finding.title}'):
+            _card(page, diagnosis, finding, rival.found, rival.remaining)
+    _add_tables(page, _alternatives(diagnosis))
+    page.folded_list(*suspects)
+    page.folded_list(*barred)
+    page.heading('Not seen, and from which size it would have been')
+    _add_tables(page, _unseen(diagnosis))
+    with page.fold('Method'):
+        page.text(' '.join(METHOD))
+        page.bullets(diagnosis.notes)
+    return page
+
+
+def _add_tables(page: Page, tables: Iterator[TitledTable]) -> None:
+    for title, note, table in tables:
+        with page.fold(title):
+            page.text(note, 'note')
+            page.table(*table)
+
+
+def _errors(page: Page, diagnosis: Diagnosis, after: Residuals) -> None:
+    floors, unit = diagnosis.noise_floors, diagnosis.residuals.unit
+    fell = bool(diagnosis.effects)
+    before, now = rms_by_drive(diagnosis.residuals), rms_by_drive(after)
+    rows = [ErrorRow('all drives', rms(diagnosis.residuals), rms(after) if fell else None,
+                     diagnosis.noise_floor)]
+    rows += [ErrorRow(name, before[name], now[name] if fell else None, floor)
+             for name, floor in floors.items() if name in before]
+    page.errors(rows, f'Error, rms [{unit}], before (grey) and with the reported effects (blue); '
+                'dotted: the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
+
+
+def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
+    """Add the first picture: the unexplained pattern, or the first effect."""
+    if diagnosis.depends_on:
+        statement = max(diagnosis.depends_on, key=lambda statement: statement.mean_square)
+        picture = figures.unknown_picture(diagnosis, statement)
+        if picture is not None:
+            page.figure(picture, f'What no effect explains, on {statement.drive}.')
+            return
+    if diagnosis.effects:
+        page.figure(*figures.effect_pictures(
+            diagnosis, diagnosis.effects[0], diagnosis.remaining)[0])
+
+
+def _card(page: Page, diagnosis: Diagnosis, finding: Finding, effect: FoundEffect,
+          remaining: Array) -> None:
+    first, *rest = finding_lines(finding)
+    page.card([first, ('equation', effect.effect.card.equation), ('looks like', finding.mark),
+               *rest], figures.effect_pictures(diagnosis, effect, remaining))
+
+
+def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
+    """Add a card with pictures for each pattern that no effect explains."""
+    for finding, group in zip(words.unexplained, unexplained_groups(diagnosis), strict=True):
+        pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
+                    for statement in group]
+        with page.fold(f'No effect explains: {finding.title}'):
+            page.card(finding_lines(finding),
+                      [(figure, text) for figure, text in pictures if figure is not None])
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -76,9 +387,7 @@ class DiagnosisResult(Result):
         """Return the page of `pprs diagnose --report`."""
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
-            self.diagnosis, self._words, after,
-            [recording.name for recording in self.inputs.fitted],
-            [recording.name for recording in self.inputs.held_out], self._rivals)
+            self.diagnosis, self._words, after, *self.inputs.names, self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -39,19 +40,8 @@ from pprs_dynamics.measurement.files.bag_storage import is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
-from pprs_dynamics.measurement.files.way_out import common_prefix
-from pprs_dynamics.physics.mechanism.branches import (
-    Branch,
-    as_likely,
-    branch_to,
-    root_of,
-)
-from pprs_dynamics.physics.mechanism.description import (
-    FIXED,
-    FLOATING,
-    PRISMATIC,
-    Description,
-)
+from pprs_dynamics.physics.mechanism.branches import Branch, as_likely, branch_to, root_of
+from pprs_dynamics.physics.mechanism.description import FIXED, FLOATING, PRISMATIC, Description
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
@@ -76,24 +66,25 @@ SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 
               'velocity'}
 
 
+TEXT = '''\
+# Model of {name}{read_with}. Lines with "guessed" or "not known" are to be checked.
+/**:
+  ros__parameters:
+    robot:
+      {format}: {place}  # from the folder of this file
+      base: {base}  # the link that does not move
+      tool: {tool}  # the link that carries the load
+      drives: {drives}  # driven, in the order of all results
+      effort_unit: {unit}  # not known from the files; A where recorded efforts are currents
+      {mark}gain: [{ones}]  # not known: effort per ampere [{unit}/A], of recorded currents
+      # gear_ratio: [{ones}]  # not known: turns of the motor per turn of the joint, for ripple
+{loops}    effort_kind: {kind}  # not known from the files: what efforts are, one of {kinds}
+    # `pprs fit` finds friction and masses, and writes them into a copy of this file.
+'''
+
+
 class FirstModelError(PprsError, ValueError):
     """A first model file cannot be written from the given files."""
-
-
-@dataclass(frozen=True)
-class Names:
-    """How a recording's joints are those of a description.
-
-    Parameters
-    ----------
-    joints : dict of str to str
-        What the recording calls each joint of the description.
-    prefix : str
-        Of all of them.
-    """
-
-    joints: Mapping[str, str] = field(default_factory=dict)
-    prefix: str = ''
 
 
 @dataclass
@@ -109,7 +100,8 @@ class FirstModel:
     base : str
     branch : Branch
     drives : tuple of str
-    names : Names
+    names : dict of str to str
+        What the recording calls each joint of the description.
     recordings : list of Path
         As they are given to commands: of several files that make one, their folder or the first.
     notes : list of str
@@ -131,7 +123,7 @@ class FirstModel:
     base: str
     branch: Branch
     drives: tuple[str, ...]
-    names: Names
+    names: Mapping[str, str]
     recordings: list[Path]
     notes: list[str]
     columns: dict[str, Any] = field(default_factory=dict)
@@ -153,42 +145,22 @@ class FirstModel:
     @property
     def text(self) -> str:
         """Content of the file."""
-        place = os.path.relpath(self.robot.resolve(), self.path.resolve().parent)
         slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
-        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
-        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
+        is_current = CURRENT in self.kinds
         names = [recording.name for recording in self.recordings[:3]]
-        read_with = f', read with {", ".join(names)}' if names else ''
-        lines = [
-            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
-            'be checked.',
-            '/**:',
-            '  ros__parameters:',
-            '    robot:',
-            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
-            'this file',
-            f'      base: {scalar(self.base)}  # the link that does not move',
-            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
-            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
-            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
-            'recorded efforts are currents',
-            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
-            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
-            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
-            'where ripple is looked for',
-            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
-              for loop in self.description.loops),
-            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
-            + ', '.join(EFFORT_KINDS),
-            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
-        ]
-        renamed = {drive: self.names.joints[drive] for drive in self.drives
-                   if self.names.joints.get(drive, drive) != drive}
-        if self.names.prefix:
-            first = self.drives[0]
-            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
-                         f'{first} {self.names.prefix}{first}')
-        elif renamed:
+        lines = TEXT.format(
+            name=self.robot.name, read_with=f', read with {", ".join(names)}' if names else '',
+            format='mjcf' if self.is_mjcf else 'urdf', unit='N' if slides else 'N m',
+            place=scalar(os.path.relpath(self.robot.resolve(), self.path.resolve().parent)),
+            base=scalar(self.base), tool=scalar(self.branch.tool), drives=_yaml([*self.drives]),
+            mark='' if is_current else '# ', ones=', '.join(['1.0'] * len(self.drives)),
+            loops=''.join(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
+                          'description\n' for loop in self.description.loops),
+            kind=CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED,
+            kinds=', '.join(EFFORT_KINDS)).splitlines()
+        renamed = {drive: name for drive in self.drives
+                   if (name := self.names.get(drive, drive)) != drive}
+        if renamed:
             lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
         if self.columns:
             lines += ['    columns:  # of tables: names, or numbers from 1',
@@ -201,7 +173,7 @@ class FirstModel:
 
 def first_model(
     robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
-    output: str | os.PathLike[str] = 'robot.yaml', *, base: str = '', tool: str = '',
+    output: str | os.PathLike[str] = 'robot.yaml', *, tool: str = '',
     drives: Sequence[str] = (), rate: float | None = None,
 ) -> FirstModel:
     """Return a first model file of a robot.
@@ -215,8 +187,8 @@ def first_model(
         quantity each are one recording.
     output : path
         Of the model file.
-    base, tool : str, optional
-        Links; without, the one that all hangs on, and the end of the longest chain.
+    tool : str, optional
+        Link that carries the load; without, the end of the longest chain.
     drives : sequence of str, optional
         Driven joints; without, those of the recording, or all up to the tool.
     rate : float, optional
@@ -234,8 +206,8 @@ def first_model(
     contents = look_into(files.get(POSITION, given[0])) if given else Contents()
     movable = [joint.name for joint in description.joints.values()
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
-    names = Names() if files else _names(contents, movable)
-    recorded = {*names.joints} | {place[0] for column in contents.series if (
+    names = {} if files else _names(contents, movable)
+    recorded = {*names} | {place[0] for column in contents.series if (
         place := joint_in(words_of(column.title), movable))}
     branch, notes = _branch(description, tool, recorded)
     notes += description.remarks
@@ -246,13 +218,13 @@ def first_model(
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
                      'to drive them, list them with friction: {motors: …}')
     by_numbers = False
-    if contents.joints and not names.joints:
+    if contents.joints and not names:
         names = _by_numbers(contents, chosen)
-        by_numbers = not all(map(_is_short_for, names.joints, names.joints.values()))
+        by_numbers = not all(map(_is_short_for, names, names.values()))
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
-    draft = FirstModel(path, Path(output), is_mjcf, description, base or root_of(description),
-                       branch, chosen, names, given, notes)
+    draft = FirstModel(path, Path(output), is_mjcf, description, root_of(description), branch,
+                        chosen, names, given, notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
@@ -266,7 +238,7 @@ def first_model(
     if by_numbers:
         draft.questions.append(
             f'the joints of {given[0].name} are matched by their numbers alone: if it is a '
-            f'recording of this robot, keep joint_map: {_yaml(names.joints)}')
+            f'recording of this robot, keep joint_map: {_yaml(names)}')
     if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
                      f'{draft.path.name}')
@@ -435,32 +407,28 @@ def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
     return found
 
 
-def _names(contents: Contents, joints: Sequence[str]) -> Names:
-    """Return how joints of messages, or of columns of our own form, are those of a description."""
+def _names(contents: Contents, joints: Sequence[str]) -> dict[str, str]:
+    """Return how joints of messages, or of columns of our own form, are those of a description.
+
+    Names may differ in how words are divided, and in what stands before them in either.
+    """
     known = dict.fromkeys(name for of in contents.joints.values() for name in of)
     known.update(dict.fromkeys(
         name.rpartition('/')[0].rpartition('/')[2] for name in (
             column.title for column in contents.series) if name.endswith(f'/{POSITION}')))
-    same = [joint for joint in joints if joint in known]
-    if same:
-        return Names({joint: joint for joint in same})
-    for count in range(len(joints), 0, -1):  # of as many as there are, from the base on
-        prefix = common_prefix(joints[:count], list(known))
-        if prefix:
-            return Names({joint: f'{prefix}{joint}' for joint in joints
-                          if f'{prefix}{joint}' in known}, prefix)
-    plain = {''.join(words_of(name)): name for name in known}
-    found = {joint: plain[''.join(words_of(joint))] for joint in joints
-             if ''.join(words_of(joint)) in plain}
+    if same := {joint: joint for joint in joints if joint in known}:
+        return same
+    found = {}
     for joint in joints:
-        # left_shoulder of the description is shoulder in the recording.
-        ends = [name for name in known if joint.endswith(f'_{name}')]
-        if joint not in found and len(ends) == 1:
-            found[joint] = ends[0]
-    return Names(found)
+        alike = ([name for name in known if ''.join(words_of(name)) == ''.join(words_of(joint))]
+                 or [name for name in known if name.endswith(joint)
+                     or joint.endswith(f'_{name}')])
+        if len(alike) == 1:
+            found[joint] = alike[0]
+    return found
 
 
-def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
+def _by_numbers(contents: Contents, drives: Sequence[str]) -> dict[str, str]:
     """Match as many joints by the numbers in their names, or refuse."""
     known = sorted({name for of in contents.joints.values() for name in of})
 
@@ -478,7 +446,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
             f'joints of the recording ({", ".join(known[:12])}) are none of the description '
             f'({", ".join(drives[:12])})' + (f'; is {close} {drives[0]}?' if close else '')
             + ': write joint_map: {JOINT: NAME} or rename them')
-    return Names(found)
+    return found
 
 
 def _is_short_for(one: str, other: str) -> bool:
@@ -488,7 +456,7 @@ def _is_short_for(one: str, other: str) -> bool:
     return one.startswith(other) or other.startswith(one)
 
 
-def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Names,
+def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Mapping[str, str],
              movable: Sequence[str], drives: Sequence[str], rate: float | None,
              ) -> tuple[dict[str, Any], list[str], set[str]]:
     """Return what `columns` hold, what was guessed, and which quantities there are."""
@@ -500,7 +468,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
             _pattern(files))
         found['files'] = pattern
     else:
-        joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
+        joints = tuple(names.get(name, name) for name in drives)
         try:
             recording = read_recording(path, RecordedDrives(
                 tuple(drives), joints, gain=(1.0,) * len(drives)))
@@ -557,18 +525,17 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
 
 def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
     """Return names of files with * for what they have in common: the name of the recording."""
-    stems = [file.name.partition('.')[0] for file in files.values()]
-    head = os.path.commonprefix(stems)  # noqa: RUF071 of letters
-    tail = os.path.commonprefix([stem[::-1] for stem in stems])[::-1]  # noqa: RUF071
+    parts = {kind: re.split('([^A-Za-z0-9])', file.name.partition('.')[0])
+             for kind, file in files.items()}
+    shared = next((at for at in (-1, 0) if len({part[at] for part in parts.values()}) == 1), None)
     found = {}
-    for (kind, file), stem in zip(files.items(), stems, strict=True):
-        if tail and not tail[0].isalpha():
-            star = stem.removesuffix(tail) + tail[:not tail[0].isalnum()] + '*'
-        elif head and not head[-1].isalpha():
-            star = '*' + head[len(head) - (not head[-1].isalnum()):] + stem.removeprefix(head)
+    for kind, part in parts.items():
+        ending = files[kind].name.removeprefix(''.join(part))
+        if shared is None:
+            part.append('*')
         else:
-            star = f'{stem}*'
-        found[kind] = star + file.name.removeprefix(stem)
+            part[shared] = '*'
+        found[kind] = ''.join(part) + ending
     return found
 
 

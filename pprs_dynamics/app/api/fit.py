@@ -6,23 +6,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report.fit_report import fit_page, fit_view
-from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.api.result import Result
+from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
+from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
+from pprs_dynamics.inference.diagnosis.quantities import plain, sentence, word_little
+from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.api.result import DataFrame, Figure
+    from pprs_dynamics.app.api.result import Figure
+
+HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
+            HALVES: 'each half of the recording predicted from the other',
+            VALIDATION: 'the validation recordings'}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -37,6 +43,7 @@ class FitResult(Result):
         The numbers, and the errors before, after and held out.
     """
 
+    rows = 'numbers'  # what `table` shows
     inputs: Inputs
     fit: BaseFit
 
@@ -59,19 +66,49 @@ class FitResult(Result):
         """Return what `pprs fit --json` writes."""
         return self.fit.to_dict()
 
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows."""
-        return fit_view(self.inputs.model, self.fit, details)
+    @property
+    def _headline(self) -> str:
+        """That the model explains little of the efforts; '' where it explains enough."""
+        return f'{word_little(self.fit.little)}, fitted nevertheless' if self.fit.little else ''
+
+    @property
+    def _errors(self) -> PlainTable:
+        """Drives, units, errors before, after and held out."""
+        fit, model = self.fit, self.inputs.model
+        return ('drive', 'unit', 'before', 'after', 'held out'), [
+            (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
+             plain(fit.held_out[drive]) if drive in fit.held_out else '')
+            for drive, unit in zip(model.drives, model.units, strict=True) if drive in fit.after]
+
+    @property
+    def _numbers(self) -> PlainTable:
+        return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
+            (number.key, number.drive, plain(number.before), plain(number.after),
+             plain(2 * number.std) if isfinite(number.std) else '', number.unit)
+            for number in self.fit.numbers]
+
+    def view(self) -> Any:
+        """Return errors and notes for the terminal; the page has every number."""
+        errors = text_table(*plain_rows(self._errors), right=(2, 3, 4),
+                            title=f'Error, rms; held out: {HELD_OUT[self.fit.held_out_on]}')
+        return stacked(*filter(None, [escape(self._headline)]), errors,
+                       *map(escape, self.fit.notes))
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""
-        return fit_page(self.inputs.model, self.fit,
-                        [recording.name for recording in self.inputs.fitted],
-                        [recording.name for recording in self.inputs.held_out])
-
-    def table(self) -> DataFrame:
-        """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([vars(number) for number in self.fit.numbers])
+        page = Page('Base model')
+        if self._headline:
+            page.text(sentence(self._headline), 'lead')
+        page.sources(self.inputs.model.source, *self.inputs.names)
+        page.errors([ErrorRow(name, self.fit.before[name], after)
+                     for name, after in self.fit.after.items()],
+                    'Error, rms, before (grey) and with the fitted numbers (blue).')
+        page.table(*self._errors)
+        page.text(f'Held out: {HELD_OUT[self.fit.held_out_on]}.', 'note')
+        page.bullets([sentence(entry) for entry in self.fit.notes])
+        with page.fold('Every number'):
+            page.table(*self._numbers)
+        return page
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""

@@ -240,6 +240,12 @@ class Inputs:
         return list(self.validation.values())
 
     @property
+    def names(self) -> tuple[list[str], list[str]]:
+        """Names of the recordings to fit to, and of those that are held out."""
+        return ([recording.name for recording in self.fitted],
+                [recording.name for recording in self.held_out])
+
+    @property
     def files(self) -> GivenFiles:
         """Their names, for commands that can be copied; placeholders for what has no file."""
         # Here and below: reading alone, as `pprs info` does, needs no statistics.

@@ -6,20 +6,39 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from pprs_dynamics import __version__
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.record import record_of
 from pprs_dynamics.app.report.terminal import as_html, as_text
-from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
+from pprs_dynamics.measurement.files.recording import Recording, describe
 
 if TYPE_CHECKING:
     # What results return, named for all of them.
     from matplotlib.figure import Figure as Figure
     from pandas import DataFrame as DataFrame
+
+
+if TYPE_CHECKING:
+    pass
+
+
+def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
+    for name, recording in recordings.items():
+        summary = describe(recording)
+        try:
+            digest = fingerprint(name) if Path(name).exists() else samples_fingerprint(recording)
+        except UnreadableFileError:
+            digest = samples_fingerprint(recording)
+        yield (f'{recording.name}: {summary.used} samples, {summary.duration:.2f} s at '
+               f'{summary.rate:.6g} Hz, sha256 {digest}')
+
 
 WIDTH = 100  # characters of a line of text
 
@@ -30,13 +49,15 @@ class Result(ABC):
     Printed, it is what the command prints; in a notebook it shows the same.
     """
 
+    rows: ClassVar[str]
+
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Return what the command writes with --json."""
 
     @abstractmethod
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows, for rich's console; all there is with `details`.
+    def view(self) -> Any:
+        """Return what the terminal shows, for rich's console.
 
         Raises
         ------
@@ -54,9 +75,9 @@ class Result(ABC):
             Where plotly is not installed.
         """
 
-    @abstractmethod
     def table(self) -> DataFrame:
-        """Return the numbers as a table of pandas."""
+        """Return the numbers as a table of pandas: the entry `rows` of the dictionary."""
+        return data_frame(self.to_dict()[self.rows])
 
     @abstractmethod
     def plot(self) -> Figure:
@@ -76,9 +97,14 @@ class Result(ABC):
 
     def record(self, command: str = '') -> list[tuple[str, str]]:
         """Return what a result is of: date, version, command, model and recordings with hashes."""
-        inputs = getattr(self, 'inputs', None)
-        return (record_of(None, {}, {}, command) if inputs is None else
-                record_of(inputs.model, inputs.recordings, inputs.validation, command))
+        found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
+                 ('version', f'pprs_dynamics {__version__}'), ('command', command)]
+        if (inputs := getattr(self, 'inputs', None)) is not None:
+            name = Path(inputs.model.source).name or 'built in memory'
+            found.append(('model', f'{name}, sha256 of its values {inputs.model.fingerprint}'))
+            found += [('recording', text) for text in _described(inputs.recordings)]
+            found += [('held out', text) for text in _described(inputs.validation)]
+        return [(label, text) for label, text in found if text]
 
     def __str__(self) -> str:
         return as_text(self.view(), WIDTH)
@@ -93,9 +119,9 @@ class Result(ABC):
         return as_html(self.view(), WIDTH)
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]], index: Sequence[str] | None = None,
-               name: str | None = None) -> DataFrame:
-    """Return rows as a table of pandas."""
+def data_frame(rows: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> DataFrame:
+    """Return rows as a table of pandas, by their names where they have any."""
     import pandas as pd
 
-    return pd.DataFrame(list(rows), index=None if index is None else pd.Index(index, name=name))
+    return (pd.DataFrame.from_dict(dict(rows), orient='index') if isinstance(rows, Mapping)
+            else pd.DataFrame(list(rows)))

@@ -14,20 +14,39 @@ import numpy as np
 
 from pprs_dynamics.app.api.inputs import Model, Progress, stage
 from pprs_dynamics.app.api.result import Result, data_frame
+from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_over_time
-from pprs_dynamics.app.report.tables import recording_page, recording_rows, simulation_view
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits, common_unit
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
+from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 500.0  # [Hz], of the 3-PPRS
+
+
+def recording_rows(recording: Recording, units: Sequence[DriveUnits],
+                   ) -> dict[str, dict[str, Array]]:
+    """Return positions and efforts of every drive, by quantity."""
+    return {f'{what} [{common_unit(units, unit)}]': dict(
+        zip(recording.drives, values.T, strict=True)) for what, unit, values in (
+            ('position', 'm', recording.position), ('effort', 'N', recording.effort))}
+
+
+def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
+    """Return a page with positions and efforts of every drive over time."""
+    page = Page(recording.name)
+    page.figure(charts.stacked(recording.time, recording_rows(recording, units), 300),
+                'Position and effort of every drive.', over_time=True)
+    return page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -70,9 +89,10 @@ class SimulationResult(Result):
         return {'samples': len(self.recording.time), 'rate': self.rate, 'seed': self.seed,
                 'effects': list(self.effects)}
 
-    def view(self, details: bool = False) -> Any:
+    def view(self) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""
-        return simulation_view(len(self.recording.time), self.rate, len(self.effects))
+        return (f'{len(self.recording.time)} samples at {self.rate:g} Hz, '
+                f'{counted(len(self.effects), "effect")} hidden')
 
     def page(self) -> Page:
         """Return a page: positions and efforts of every drive over time."""
@@ -80,12 +100,10 @@ class SimulationResult(Result):
 
     def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
-        drives = describe(self.recording).drives
-        return data_frame([{'lowest_position': drive.position[0],
-                            'highest_position': drive.position[1],
-                            'lowest_effort': (drive.effort or (np.nan, np.nan))[0],
-                            'highest_effort': (drive.effort or (np.nan, np.nan))[1]}
-                           for drive in drives.values()], list(drives), 'drive')
+        return data_frame({name: dict(zip(
+            ('lowest_position', 'highest_position', 'lowest_effort', 'highest_effort'),
+            (*drive.position, *(drive.effort or (np.nan, np.nan))), strict=True))
+            for name, drive in describe(self.recording).drives.items()})
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
@@ -94,9 +112,9 @@ class SimulationResult(Result):
 
 
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
-             scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
-             path_seed: int = 0, noise: float | None = None, thermometers: bool = False,
-             link_encoders: bool = False, progress: Progress | None = None) -> SimulationResult:
+             motion: PlatformMotion | None = None, duration: float = 40.0,
+             path_seed: int = 0, noise: float | None = None,
+             progress: Progress | None = None) -> SimulationResult:
     """Record a robot of a physics engine that has effects which its model does not know of.
 
     Parameters
@@ -106,8 +124,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         Names of effects, drawn from the seed; 'random' draws the names, too.
     seed : int
         Of effects and noise.
-    scale : float
-        Multiplies the strength of the effects.
     motion : PlatformMotion, optional
         Of a 3-PPRS at 500 Hz; by default, and of other robots always, a random one.
     duration : float
@@ -116,8 +132,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         Of the random motion.
     noise : float, optional
         Standard deviation of the efforts [N m, N]: by default half a percent of the largest.
-    thermometers, link_encoders : bool
-        Whether they are recorded where no effect needs them.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -148,8 +162,9 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
             nominal = _of_drives(found, _excitation(duration, 0))
         motion = _excitation(duration, path_seed) if motion is None else motion
         drives = _of_drives(found, motion)
-    run = simulate_mechanism(robot, names, seed, scale, noise, duration, path_seed, share_done,
-                             thermometers, link_encoders, drives, nominal)
+    run = simulate_mechanism(
+        robot, names, seed, noise=noise, duration=duration, path_seed=path_seed,
+        progress=share_done, motion=drives, nominal=nominal)
     time = run.motion.time
     assert time is not None
     recording = Recording.from_arrays('simulated', time, run.position, None, run.effort,

@@ -11,8 +11,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.adopt import adopt
-from pprs_dynamics.app.commands.arguments import add_shared
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
+from pprs_dynamics.app.commands.arguments import add_shared, read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.effects.catalogue import catalogue

@@ -1,21 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Checks of command-line values; argparse turns their errors into one line and status 2."""
+"""What commands read, print and write: arguments with their checks, recordings, results.
+
+argparse turns the errors of checks into one line and status 2. Files are written whole or not.
+"""
 
 from __future__ import annotations
 
 import argparse
-import math
+import json
 import os
+import shlex
 from collections.abc import Callable
+from contextlib import suppress
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from pprs_dynamics.app.report.terminal import shown, staged_bar
 from pprs_dynamics.errors import PprsError, UnreadableFileError
-from pprs_dynamics.system.files import writable_file
+from pprs_dynamics.system.files import writable_file, write_text
 from pprs_dynamics.system.numbers import parse_number, parse_whole
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import displayed, for_json
+
+if TYPE_CHECKING:
+    from pprs_dynamics.app.api.inputs import Inputs
+    from pprs_dynamics.app.api.result import Result
+    from pprs_dynamics.app.report.page import Page
+
 
 JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)
 FILES_OF_RECORDINGS = ('.csv', '.mcap', '.db3')
@@ -24,12 +37,15 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap')
-INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'file', 'manifest',
           'store', 'path')
 NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
          'store': 'the store'}
 
 DEFAULT_MODEL = 'config/paper.yaml'
+
+
+Number = TypeVar('Number', int, float)
 
 
 class UsageError(PprsError, ValueError):
@@ -41,29 +57,23 @@ def number(lower: float, upper: float, unit: str = '', above: bool = False,
     """Return a reader of numbers from `lower`, or above it, to `upper`."""
     rule = (f'must be greater than {lower:g} and at most {upper:g}' if above
             else f'must lie between {lower:g} and {upper:g}') + f' {unit}' * bool(unit)
-
-    def read(text: str) -> float:
-        try:
-            value = parse_number(text)
-        except ValueError:
-            value = math.nan
-        if not lower <= value <= upper or (above and value == lower):
-            raise argparse.ArgumentTypeError(f'{text[:MOST_SHOWN]!r} {rule}')
-        return value
-    return read
+    return _reader(parse_number, lambda value: lower <= value <= upper and (
+        not above or value > lower), rule)
 
 
 def whole(lower: int, upper: int) -> Callable[[str], int]:
     """Return a reader of whole numbers from `lower` to `upper`."""
-    def read(text: str) -> int:
-        try:
-            value = parse_whole(text)
-        except ValueError:
-            value = -1
-        if not lower <= value <= upper:
-            raise argparse.ArgumentTypeError(
-                f'{text[:MOST_SHOWN]!r} must be a whole number from {lower} to {upper}')
-        return value
+    return _reader(parse_whole, lambda value: lower <= value <= upper,
+                   f'must be a whole number from {lower} to {upper}')
+
+
+def _reader(parse: Callable[[str], Number], fits: Callable[[Number], bool], rule: str,
+            ) -> Callable[[str], Number]:
+    def read(text: str) -> Number:
+        with suppress(ValueError):
+            if fits(value := parse(text)):
+                return value
+        raise argparse.ArgumentTypeError(f'{text[:MOST_SHOWN]!r} {rule}')
     return read
 
 
@@ -112,7 +122,6 @@ SHARED: dict[str, dict[str, Any]] = {
     'reference': {'metavar': 'RECORDING', 'nargs': '*', 'help': 'report what has changed since '
                   'these recordings of the healthy machine (none named: those that the model file '
                   'names)'},
-    'details': {'action': 'store_true', 'help': 'print all findings, tables and values'},
     'report': {'metavar': 'FILE.html', 'type': output_file(*PAGE),
                'help': 'write a page with all figures'},
     'output': {'metavar': 'FILE.yaml', 'type': output_file(*MODEL), 'help': 'model file to write'},
@@ -165,3 +174,62 @@ def check_files(options: argparse.Namespace) -> None:
                 raise UnreadableFileError(name, 'it exists already, must be another name for '
                                           f'--{option}: recordings are never replaced')
             seen[real] = NAMED.get(option, f'--{option}')
+
+
+def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -> Inputs:
+    """Read model and recordings of the arguments, and print what is wrong with the latter.
+
+    Excerpts of what is too long for a fit, but where the `whole` is asked for.
+
+    Raises
+    ------
+    PprsError
+        As `Inputs.of`.
+    """
+    # Here, as what only writes needs no statistics.
+    from pprs_dynamics.app.api.inputs import Inputs
+
+    with staged_bar(screen) as progress:
+        inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
+                           options.topic, progress, whole, getattr(options, 'as_it_is', False))
+    for recording in (*inputs.fitted, *inputs.held_out):
+        # That velocities are computed is no fault; `pprs info` says so.
+        for finding in (each for each in recording.findings if each.kind != 'missing_velocity'):
+            screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
+    return inputs
+
+
+def make_folder(path: str | PathLike[str]) -> Path:
+    """Return the folder, made where it does not exist."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UnreadableFileError(folder, f'cannot be a folder for output: {error.strerror}'
+                                  ) from None
+    return folder
+
+
+def write_json(path: str | PathLike[str], content: Any) -> None:
+    """Write JSON atomically; see `for_json`."""
+    write_text(path, json.dumps(for_json(content), indent=2, ensure_ascii=False) + '\n')
+
+
+def tell(result: Result, options: argparse.Namespace, screen: Any,
+         page: Callable[[], Page] | None = None, view: Any = None, **beside: str) -> None:
+    """Print a result, and write what --json and --report ask for: its view and page by default.
+
+    What else is given stands in the JSON, too.
+    """
+    if options.json:
+        write_json(options.json, {**result.to_dict(), **beside})
+    if getattr(options, 'report', None):
+        with staged_bar(screen) as progress:
+            progress('page', 0.0)
+            made = (page or result.page)()
+            made.record(result.record(shlex.join(['pprs', *getattr(options, 'words', ())])))
+            made.write(options.report)
+    # Last: a reader of the text that goes away, as `head` does, ends the command.
+    screen.print(result.view() if view is None else view)
+    if getattr(options, 'report', None):
+        screen.print(f'page: {shown(options.report)}', soft_wrap=True)

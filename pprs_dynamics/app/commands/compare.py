@@ -9,7 +9,7 @@ import argparse
 
 from pprs_dynamics.app.api.compare import compare
 from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
+from pprs_dynamics.app.commands.arguments import read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
@@ -17,7 +17,7 @@ EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'details', 'report')
+    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'report')
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='bag to write: measured effort, effort of the model, its parts and '
                         'the residual, as sensor_msgs/JointState')

@@ -11,9 +11,8 @@ from typing import Any
 from pprs_dynamics.app.api.adopt import adopt_all
 from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_json
+from pprs_dynamics.app.commands.arguments import read_inputs, tell, write_json
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 from pprs_dynamics.system.plain_text import counted
 
 EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --report why.html'
@@ -22,12 +21,11 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference',
-                         'details', 'report')
+                         'report')
+    parser.add_argument('--details', action='store_true',
+                        help='print all findings, tables and values')
     parser.add_argument('--adopt-all', action='store_true',
-                        help='adopt the reported effects until nothing is missing')
-    parser.add_argument('--refit', metavar='RECORDING', nargs='*',
-                        help='then fit the base model again with the added effects, as pprs fit '
-                        'does: to these recordings, or to the diagnosed ones')
+                        help='add the reported effects')
     arguments.add_shared(parser, 'output', required=False,
                          output='model file that --adopt-all writes')
 
@@ -37,8 +35,6 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     screen = console()
     inputs = read_inputs(options, screen)
-    if options.refit is not None:
-        require_open_numbers(inputs.model)
     with staged_bar(screen) as progress:
         result = diagnose(inputs.model, inputs, progress=progress, reference=options.reference)
     tell(result, options, screen,
@@ -47,24 +43,21 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: Any) -> int:
-    """Adopt step by step, write the model file, and return the exit status.
+    """Adopt the reported effects, write the model file, and return the exit status.
 
     With nothing to adopt the file is written as it was; with a refusal, what was adopted before
     it, if anything.
     """
     inputs = diagnosis.inputs
     with staged_bar(screen) as progress:
-        result = adopt_all(inputs.model, inputs, refit=options.refit, diagnosis=diagnosis,
-                           topic=options.topic, progress=progress,
+        result = adopt_all(inputs.model, inputs, diagnosis=diagnosis, progress=progress,
                            reference=options.reference)
-    screen.print(result.view(options.details))
+    screen.print(result.view())
     if options.json:
         write_json(options.json, {**diagnosis.to_dict(), 'adoption': result.to_dict()})
     count = len(result.run.adopted)
     if count or not result.refused:
         result.save(options.output)
-        if result.refit is not None:
-            screen.print(result.refit.change)
         screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
 
@@ -73,12 +66,6 @@ def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
         raise arguments.UsageError('--adopt-all: no --output FILE is given, must say where the '
                                    'new model file goes')
-    if options.refit is not None and not options.adopt_all:
-        raise arguments.UsageError('--refit: it is given without --adopt-all, which adds the '
-                                   'effects that the base model is fitted again with')
-    if options.refit is not None and options.reference is not None:
-        raise arguments.UsageError('--refit: it is given with --reference, but the base is that of '
-                                   'the reference: fit it to that by pprs fit')
     if options.output and not options.adopt_all:
         raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
                                    'written to it then; --json and --report write the answer')

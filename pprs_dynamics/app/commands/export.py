@@ -11,8 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import output_file
-from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.commands.arguments import output_file, write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.export.exported_robot import FORMATS, export_robot, express, written

@@ -8,8 +8,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.fit import fit
-from pprs_dynamics.app.commands.arguments import add_shared
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
+from pprs_dynamics.app.commands.arguments import add_shared, read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
@@ -17,7 +16,7 @@ EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'output', 'details', 'report')
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'output', 'report')
 
 
 def run(options: argparse.Namespace) -> int:

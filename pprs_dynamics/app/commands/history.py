@@ -9,8 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import UsageError, add_shared
-from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.physics.model.drive_model import DriveModel

@@ -11,14 +11,10 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
-from pprs_dynamics.app.commands.arguments import UsageError, add_shared
-from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.report.mechanism_description import (
-    describe_mechanism,
-    mechanism_lines,
-)
-from pprs_dynamics.app.report.tables import reading_table, recording_page
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.api.simulate import recording_page
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
+from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
+from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
     OtherReading,
@@ -28,6 +24,7 @@ from pprs_dynamics.inference.readings.findings import (
 from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.plain_text import counted
 
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
@@ -90,3 +87,76 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
     return recordings, summaries
+
+
+def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
+    """Return how the columns of a recording are read: column, drive, quantity, unit, range."""
+    rows = []
+    joints = recorded.joints or recorded.names
+    for drive, joint, units in zip(recorded.names, joints, recorded.units, strict=True):
+        found = summary.drives[drive]
+        columns = (DriveColumns() if recorded.columns is None
+                   else recorded.columns.drives.get(drive, DriveColumns()))
+        current = 'current' in columns.names
+        in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
+                         for finding in summary.findings)
+        for quantity, bounds, unit, factor in (
+                ('position', found.position, units.position, columns.position_scale),
+                ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
+                ('current' if current else 'effort', found.effort,
+                 'A' if in_amperes else units.effort, columns.effort_scale),
+                *((name, each, units.of(CHANNELS[name]), 1.0)
+                  for name, each in found.channels.items())):
+            if bounds is not None:
+                column = columns.names.get(quantity, f'{joint}/{quantity}')
+                rows.append((escape(str(column)), escape(drive), quantity, unit + (
+                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds) + (
+                        f' ({found.measured:.1%} measured)'
+                        if quantity in ('current', 'effort') and found.measured < 1 else '')))
+    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows, right=(),
+                      caption=escape(summary.source), title=escape(
+                          f'{summary.name}: {summary.used} of {summary.samples} samples in '
+                          f'{counted(len(summary.segments), "segment")}, '
+                          f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
+
+
+def _span(bounds: tuple[float, float] | None) -> str:
+    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
+
+
+def describe_mechanism(model: DriveModel) -> dict[str, Any]:
+    """Return bodies, joints, loops, mobility and conditioning, for JSON."""
+    s = model.robot.structure
+
+    def role(row: int) -> str:
+        c = int(s.tables.coordinate[row])
+        return 'driven' if c in s.tables.drives else 'held' if c in s.mobility.held else 'passive'
+    return {
+        'bodies': [{'link': link, 'mass': float(mass)} for link, mass in zip(
+            model.robot.body_names, model.robot.masses, strict=True)],
+        'joints': [{'name': name, 'kind': s.description.joints[name].kind, 'role': role(row)}
+                   for name, row in s.rows.items()],
+        'loops': [{'name': loop.name, 'type': loop.kind, 'a': loop.a, 'b': loop.b}
+                  for loop in s.loops],
+        'drives': list(s.drives), 'degrees_of_freedom': s.mobility.freedoms,
+        'condition_number': s.mobility.condition}
+
+
+def mechanism_lines(model: DriveModel) -> list[str]:
+    """Return the same as sentences for the terminal."""
+    s = model.robot.structure
+    held = f': {", ".join(s.held)} held' if s.held else ''
+    lines = [
+        f'{counted(len(model.robot.masses), "body")}, {model.robot.masses.sum():.4g} kg in total, '
+        f'{counted(len(s.rows), "joint")}, {counted(len(s.loops), "loop")}',
+        f'{counted(s.mobility.freedoms, "degree of freedom")}, '
+        f'{counted(len(s.drives), "drive")} ({", ".join(s.drives)}){held}']
+    if s.loops:
+        lines += ['loops: ' + ', '.join(f'{loop.name} ({loop.kind}, {loop.a} on {loop.b})'
+                                        for loop in s.loops),
+                  f'{len(s.mobility.rows)} independent rows close them at home; condition number '
+                  f'{s.mobility.condition:.3g} (lengths in units of {s.size:.3g} m)']
+    lines.append('home: ' + ', '.join(
+        f'{name} {value:.4g} {"rad" if unit.turns else "m"}' for name, value, unit in zip(
+            s.drives, s.home[s.tables.drives], model.units, strict=True)))
+    return lines

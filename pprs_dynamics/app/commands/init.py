@@ -11,12 +11,10 @@ from dataclasses import asdict
 from shlex import quote
 
 from pprs_dynamics.app.api.first_model import first_model
-from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file
-from pprs_dynamics.app.commands.info import show_recordings
-from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.report.mechanism_description import mechanism_lines
+from pprs_dynamics.app.api.simulate import recording_rows
+from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
+from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
 from pprs_dynamics.app.report.pictures import plot_over_time, save
-from pprs_dynamics.app.report.tables import recording_rows
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -34,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'count as one recording')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
-    parser.add_argument('--base', metavar='LINK', default='', help='the link that does not move')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
@@ -51,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
                          'for --output, or be given with --overwrite')
     screen = console()
     drives = [name for name in options.drives.split(',') if name]
-    first = first_model(options.robot, options.recordings, options.output, base=options.base,
+    first = first_model(options.robot, options.recordings, options.output,
                         tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)
     model = first.model

@@ -13,9 +13,10 @@ from pprs_dynamics.app.commands.arguments import (
     POSES,
     add_shared,
     output_file,
+    read_inputs,
     seed,
+    tell,
 )
-from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shell_command, shown, staged_bar
 from pprs_dynamics.inference.experiments.next_experiment import PURPOSES, check_purpose
 from pprs_dynamics.system.plain_text import displayed

@@ -25,12 +25,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.commands.arguments import (
-    DEFAULT_MODEL,
-    JSON,
-    check_files,
-    output_file,
-)
+from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
 from pprs_dynamics.errors import MisreadError, PprsError, suggestion
 from pprs_dynamics.system.plain_text import PLAIN, displayed
 from pprs_dynamics.system.threads import use_one_thread

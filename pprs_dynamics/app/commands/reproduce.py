@@ -13,11 +13,9 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import output_folder
-from pprs_dynamics.app.commands.input_output import make_folder, write_json
+from pprs_dynamics.app.commands.arguments import make_folder, output_folder, write_json
 from pprs_dynamics.app.report.pictures import draw_figure_8, draw_figure_9
-from pprs_dynamics.app.report.tables import claims_table
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, escape, shown, text_table
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -52,7 +50,11 @@ def run(options: argparse.Namespace) -> int:
                'claims': [asdict(claim) for claim in result.claims]}
     for file in filter(None, (folder / 'claims.json', options.json)):
         write_json(file, content)
-    screen.print(claims_table(result.claims))
+    screen.print(text_table(
+        ('claim', 'paper', 'found', 'reproduced'),
+        [(escape(claim.claim), escape(claim.paper), escape(claim.found),
+          '[green]yes[/]' if claim.reproduced else '[red]no[/]') for claim in result.claims],
+        right=(), whole=(3,), show_lines=True, title='The paper\'s claims and their reproduction'))
     screen.print('written: ' + ', '.join(map(shown, (*written, folder / 'claims.json'))))
     return 0
 

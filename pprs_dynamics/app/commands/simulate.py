@@ -13,8 +13,7 @@ import argparse
 import numpy as np
 
 from pprs_dynamics.app.api.simulate import RATE, simulate
-from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file, seed
-from pprs_dynamics.app.commands.input_output import tell
+from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file, seed, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import HelicalPath

@@ -8,11 +8,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import UsageError, output_folder, whole
-from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.commands.arguments import UsageError, output_folder, whole, write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_each
-from pprs_dynamics.app.fleet.recordings import find_recordings, pandas, read_manifest
-from pprs_dynamics.app.fleet.store import AUTO, write_rows
+from pprs_dynamics.app.fleet.recordings import (
+    AUTO,
+    find_recordings,
+    pandas,
+    read_manifest,
+    write_rows,
+)
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine, key, model_of, requests_of
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.system.plain_text import counted

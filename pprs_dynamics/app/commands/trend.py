@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import add_shared
-from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.fleet.trend import fleet_trends
+from pprs_dynamics.app.commands.arguments import add_shared, write_json
+from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends
+from pprs_dynamics.app.report import charts
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import console, shown
 
 EXAMPLE = 'pprs trend store --report trend.html'
+MOST_DRAWN, MOST_LISTED = 40, 50
+HEIGHT = 170  # [px] of a row
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +33,35 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, fleet.to_dict())
     if options.report:
-        from pprs_dynamics.app.report.fleet_page import fleet_page
-
         screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}', soft_wrap=True)
     return 0
+
+
+def fleet_page(fleet: FleetTrends) -> Page:
+    """Return the page."""
+    changed = fleet.changed
+    count = len({trend.robot for trend in changed})
+    page = Page(f'Fleet: {count} of {len(fleet.robots)} robots changed')
+    first, *others = fleet.sentences()
+    page.text(first, 'lead')
+    page.bullets(others)
+    if changed:
+        drawn = changed[:MOST_DRAWN]
+        figure = charts.rows_over_time(len(drawn), 80 + HEIGHT * len(drawn), showlegend=False)
+        figure.update_xaxes(title_text='', ticksuffix='', hoverformat='%Y-%m-%d %H:%M')
+        for row, trend in enumerate(drawn, start=1):
+            figure.add_trace(charts.trace(
+                trend.time.dt.strftime('%Y-%m-%dT%H:%M:%S'), trend.value, trend.name,
+                charts.MODEL, mode='markers', hovertemplate=f'%{{y:.4g}} {trend.unit}'),
+                row=row, col=1)
+            figure.add_annotation(text=f'<b>{trend.robot}</b>, {trend.name} [{trend.unit}]',
+                                  x=0, y=1, xref='x domain', yref='y domain', xanchor='left',
+                                  yanchor='bottom', showarrow=False, row=row, col=1)
+            for step in trend.steps:
+                figure.add_vline(x=f'{step.time:%Y-%m-%dT%H:%M:%S}', row=row, col=1,
+                                 line={'color': charts.ERROR, 'dash': 'dash'})
+        page.figure(figure, 'Quantities that changed, the clearest first. Dashed: the first '
+                    'recording after a step.')
+    page.heading('Recordings without a result') if fleet.refused else None
+    page.bullets([f'{path}: {reason}' for path, reason in fleet.refused.items()][:MOST_LISTED])
+    return page

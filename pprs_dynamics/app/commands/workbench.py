@@ -13,16 +13,9 @@ import re
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.commands.arguments import (
-    DEFAULT_MODEL,
-    add_shared,
-    whole,
-)
-from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
+from pprs_dynamics.app.commands.arguments import add_shared, whole
+from pprs_dynamics.app.workbench.server.hub import Hub, Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
-from pprs_dynamics.app.workbench.session_file import ENDING, SavedSession
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
@@ -38,48 +31,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
                         help='bag or table, as for all commands; or a folder of them, to choose '
-                        'from in the browser; or one saved session.json')
+                        'from in the browser')
     add_shared(parser, 'validate', 'reference', 'topic', validate='a recording that is not fitted: '
                'adoptions are judged on it; may be repeated')
     parser.add_argument('--live', action='store_true',
                         help='subscribe to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
                         help='topic of --live (default: that of --topic, else joint_states)')
-    parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
-                        help='namespace of the topic and nodes of --live')
     parser.add_argument('--port', type=whole(0, 65535), default=0,
                         help='port of the server (default: any free one)')
     parser.add_argument('--host', type=_one_address, default=HOST,
                         help=f'address of the server (default {HOST}: this machine only)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
     parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='ARGUMENT',
-                        help='arguments of the node of --live, as of any ROS 2 node: remappings, '
-                        'joint_prefix, use_sim_time, QoS; must come last')
+                        help='arguments of the node of --live, as of any ROS 2 node: namespace (-r '
+                        '__ns:=/NAME), remappings, joint_prefix, use_sim_time, QoS; must come last')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     given = [path for path in options.recordings if not is_folder(path)]
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
-    saved = _saved(options)
-    inputs = saved.inputs if saved else Inputs.read(
+    inputs = Inputs.read(
         options.model, given, options.validate, options.topic).since(options.reference)
     live = _live(options, inputs.model) if options.live else None
-    hub = Hub(inputs, Offered.of([] if saved else options.recordings), live, saved)
+    hub = Hub(inputs, Offered.of(options.recordings), live)
     serve(hub, options.host, options.port, not options.no_browser)
     return 0
-
-
-def _saved(options: argparse.Namespace) -> SavedSession | None:
-    """Read a saved session, which has its recordings and its model in itself; None for none."""
-    paths = [path for path in options.recordings if path.endswith(ENDING)]
-    if not paths:
-        return None
-    if (len(options.recordings) > 1 or options.validate or options.reference is not None
-            or options.model != DEFAULT_MODEL):
-        raise SessionError(f'{displayed(paths[0])} is a session, must be given alone: it names its '
-                           'recordings, its model and its reference')
-    return SavedSession.read(paths[0])
 
 
 def _one_address(text: str) -> str:
@@ -104,5 +82,4 @@ def _live(options: argparse.Namespace, model: DriveModel) -> Any:
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
     return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                     'monitor', 'feedforward', options.namespace,
-                     ['--ros-args', *options.ros_args])
+                     arguments=['--ros-args', *options.ros_args])

@@ -8,7 +8,9 @@ Workers run `examine`. A recording that is refused is a row with the reason.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+import hashlib
+import json
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -18,20 +20,30 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.fleet.named_effects import fit_named_effects
-from pprs_dynamics.app.fleet.recordings import SurveyedRecording
-from pprs_dynamics.app.fleet.store import AUTO, MODEL, key_of
+from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, SurveyedRecording
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.estimates import estimate_present
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
+from pprs_dynamics.inference.search.components import placed, shapes_of
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.estimates import (
+    Calibration,
+    Estimate,
+    calibrations,
+    estimate,
+    estimate_present,
+)
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
@@ -69,7 +81,8 @@ class SurveyJob:
 
 def key(common: Mapping[str, Any]) -> str:
     """Return the name of a recording's file in a store."""
-    return key_of(*(common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')))
+    parts = [common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')]
+    return hashlib.sha256(json.dumps(parts).encode(errors='surrogateescape')).hexdigest()[:40]
 
 
 def requests_of(options: str, model: DriveModel) -> tuple[EffectRequest, ...]:
@@ -99,27 +112,34 @@ Judged = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
 """Rows of values, numbers by drive, and the verdict."""
 
 
+def _row(effect: type[CatalogueEffect], key: str, found: Estimate, **more: float) -> dict[str, Any]:
+    """Return the row of a parameter, by its key with its drive."""
+    drive, parameter = effect.place_and_parameter(key)
+    return {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
+            **found.to_dict(), **more}
+
+
+def _numbers(calibrated: Sequence[Calibration]) -> list[dict[str, Any]]:
+    """Return the rows of the model's numbers that are open within tolerances."""
+    return [{'effect': MODEL, 'parameter': number.label, 'value': number.after,
+             'std': number.std, 'unit': number.unit} for number in calibrated]
+
+
 def _diagnosed(model: DriveModel, recording: Recording, job: SurveyJob) -> Judged:
     _refuse_mistakes(model, recording, job)
     diagnosis = diagnose(model, [recording])
-    rows: list[dict[str, Any]] = []
-    for effect in diagnosis.effects:
-        for name, estimate in effect.parameters.items():
-            drive, parameter = effect.effect.place_and_parameter(name)
-            rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
-                         'value': estimate.value, 'std': estimate.std, 'unit': estimate.unit,
-                         'evidence': effect.evidence})
+    rows = [_row(effect.effect, key, found, evidence=effect.evidence)
+            for effect in diagnosis.effects for key, found in effect.parameters.items()]
     rows += _as_in_model(diagnosis, {(row['drive'], row['effect']) for row in rows})
-    rows += [{'effect': MODEL, 'parameter': number.label, 'value': number.after,
-              'std': number.std, 'unit': number.unit} for number in diagnosis.calibrated]
+    rows += _numbers(diagnosis.calibrated)
     return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict
 
 
 def _fitted(model: DriveModel, recording: Recording, job: SurveyJob) -> Judged:
     # The check of units and signs takes longer than a fit: only a bad fit is checked.
     try:
-        rows, residuals, noise = fit_named_effects(model, recording,
-                                                   requests_of(job.options, model))
+        rows, residuals, noise = fit_named_effects(
+            model, recording, requests_of(job.options, model))
     except PprsError:
         _refuse_mistakes(model, recording, job)
         raise
@@ -156,8 +176,66 @@ def _as_in_model(diagnosis: Diagnosis, reported: Container[tuple[str | None, str
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
         estimates = estimate_present(selection.best.fits, selection.best.fitted, effect)
-        for name, estimate in estimates.items():
-            drive, parameter = effect.place_and_parameter(name)
-            if (drive or None, effect.name) not in reported:
-                yield {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
-                       'value': estimate.value, 'std': estimate.std, 'unit': estimate.unit}
+        for key, found in estimates.items():
+            row = _row(type(effect), key, found)
+            if (row['drive'], row['effect']) not in reported:
+                yield row
+
+
+def fit_named_effects(model: DriveModel, recording: Recording, requests: Sequence[EffectRequest],
+                      ) -> tuple[list[dict[str, Any]], Residuals, dict[str, float]]:
+    """Return the values of named effects and of the model's numbers, fitted together.
+
+    No search: every effect is fitted on every drive that is asked for, whether it pays or not, so
+    that its values can be followed from recording to recording. Of an effect that the model has,
+    its rows hold what the recording says that it is, not what it changes.
+
+    Returns
+    -------
+    rows : list of dict
+        drive, effect, parameter, value, std, unit, evidence.
+    residuals : Residuals
+        Of the model as given.
+    noise : dict of str to float
+        Noise of the fit, by drive [N].
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    fits = FittedSets(Design.of(model, [recording]), DECISIONS)
+    candidates = tuple(EffectCandidate.of(components) for request in requests
+                       if (components := list(_components(fits, request))))
+    # Without constraints: values of an effect that is not there scatter about 0.
+    found = fits.at_noise_of(fits.evaluate(candidates), candidates)
+    rows = []
+    for candidate in candidates:
+        rest = tuple(other for other in candidates if other is not candidate)
+        evidence = fits.at_noise_of(found, rest).total - found.total
+        rows += [_row(candidate.effect, key, value, evidence=evidence) for key, value in estimate(
+            fits, found, candidate, True).parameters.items()]
+    design = fits.design
+    return ([*rows, *_numbers(calibrations(fits, found))], design.residuals,
+            {design.drives[d]: fits.regression.noise_floor(found.fit, d)
+             for d in fits.regression.drives})
+
+
+def _components(fits: FittedSets, request: EffectRequest) -> Iterator[Component]:
+    """Yield an effect in the structure, or on each drive in the shape that gains most."""
+    effect, design = request.effect, fits.design
+    if not issubclass(effect, DriveEffect):
+        yield from (placed(design, term.effect, None, {}, term.names) for term in design.structure
+                    if term.effect.name == effect.name
+                    and any(np.any(rows) for rows in term.rows.values()))
+        return
+    names = tuple(coefficient.name for coefficient in effect.coefficients)
+    alone = fits.evaluate(()).fit
+    for d in fits.regression.drives:
+        if design.acts_on(effect, d) and design.drives[d] in (request.drives or design.drives):
+            there = design.present(effect, d)
+            shapes = shapes_of(design, effect, d) if there is None or not effect.shape else [
+                {parameter.name: there[parameter.name] for parameter in effect.shape}]
+            yield max((placed(design, effect, d, shape, names) for shape in shapes),
+                      key=lambda component: fits.regression.gain(
+                          alone, fits.components.block(component)))

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.fleet.recordings import pandas
-from pprs_dynamics.app.fleet.store import AUTO, MODEL, read_rows
+from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, pandas, read_rows
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, with_uncertainty

@@ -198,12 +198,10 @@ class Page:
         layout = content['layout']
         layout.pop('template', None)  # the page's own colours are set in the browser
         height = layout.get('height') or HEIGHT
-        title = layout.get('title')
-        label = caption or str(title.get('text', '') if isinstance(title, dict) else title or '')
         data = json.dumps({'data': content['data'], 'layout': layout}, cls=PlotlyJSONEncoder,
                           separators=(',', ':'))
         return (f'<figure><div class="plot" id="{name}" role="img" tabindex="0" '
-                f'aria-label="{escape(label or "Figure", quote=True)}" '
+                f'aria-label="{escape(caption or "Figure", quote=True)}" '
                 f'style="height:{height}px"{" data-time" * over_time}></div>'
                 + (f'<figcaption>{escape(caption)}</figcaption>' if caption else '')
                 + f'{_data(f"{name}-data", data)}</figure>')

@@ -141,11 +141,9 @@ def plain_rows(table: PlainTable) -> PlainTable:
     return headings, [tuple(map(escape, row)) for row in rows]
 
 
-def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None,
-                 caption: str | None = None) -> Any:
+def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None) -> Any:
     """Return a table of plain text below its title."""
-    return text_table(*plain_rows(table), right=right, frame='head', title=escape(title),
-                      caption=caption and escape(caption), caption_justify='left')
+    return text_table(*plain_rows(table), right=right, frame='head', title=escape(title))
 
 
 @contextmanager

@@ -6,17 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from itertools import count
+from threading import Thread
+from typing import Any, Generic, TypeVar
 
-import numpy as np
-
-from pprs_dynamics.app.workbench.background import Cancelled, Job
-from pprs_dynamics.app.workbench.errors import SessionError
+from pprs_dynamics.app.api.next_experiment import ExperimentResult, next_experiment
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import names_of
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original
@@ -24,25 +24,97 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.experiments.next_experiment import check_duration, next_experiment
+from pprs_dynamics.inference.experiments.next_experiment import check_duration
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.worker_process import run_in_process as run
 
+Result = TypeVar('Result')
+NUMBERS = count(1)  # each job has one of its own
+
+
+class Cancelled(Exception):
+    """A cancelled job. Not a `PprsError`: nothing may take it for bad input."""
+
+
+class Job(Generic[Result]):
+    """One piece of work in a thread of its own.
+
+    Parameters
+    ----------
+    kind, what : str
+        'adopt', 'diagnose' or 'experiment'; and of what.
+    work : callable
+        Called with a function that it must call with the share that is done; this raises
+        `Cancelled` after `cancel`.
+    changed : callable, optional
+        Called when the progress changes, and at the end.
+    """
+
+    def __init__(self, kind: str, what: str, work: Callable[[Callable[[float], None]], Result],
+                 changed: Callable[[], None] = lambda: None) -> None:
+        self.kind, self.what, self.share, self.number = kind, what, 0.0, next(NUMBERS)
+        self._work, self._changed, self._is_called_off = work, changed, False
+        self._future: Future[Result] = Future()
+
+    def start(self) -> Job[Result]:
+        """Begin, and return the job."""
+        Thread(target=self._run, name=f'{self.kind} {self.what}', daemon=True).start()
+        return self
+
+    @property
+    def is_running(self) -> bool:
+        """True until it has ended, however."""
+        return not self._future.done()
+
+    def cancel(self) -> None:
+        """Call it off; it ends at its next report of progress."""
+        self._is_called_off = True
+
+    def result(self, timeout: float | None = None) -> Result:
+        """Wait for the end and return the result.
+
+        Raises
+        ------
+        Cancelled
+            Where it was called off.
+        TimeoutError
+            Where it takes longer [s].
+        PprsError
+            As the work.
+        """
+        return self._future.result(timeout)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return kind, progress and error, for JSON."""
+        error = None if self.is_running else self._future.exception()
+        is_cancelled = isinstance(error, Cancelled)  # work that was done by then counts
+        return {'number': self.number, 'kind': self.kind, 'what': self.what,
+                'share': round(self.share, 3), 'is_running': self.is_running,
+                'is_cancelled': is_cancelled,
+                'error': '' if error is None or is_cancelled else
+                str(error) if isinstance(error, PprsError) else f'{type(error).__name__}: {error}'}
+
+    def _report(self, share: float) -> None:
+        if self._is_called_off:
+            raise Cancelled(self.what)
+        # A bar never goes back.
+        if share > self.share + 0.01:
+            self.share = min(share, 1.0)
+            self._changed()
+
+    def _run(self) -> None:
+        try:
+            self._report(0.0)
+            self._future.set_result(self._work(self._report))
+        except BaseException as error:  # raised again by `result`
+            self._future.set_exception(error)
+        self._changed()
+
+
 run_in_process = partial(run, niceness=2)  # whoever clicks comes first
-RATE = 100.0  # of the poses of a designed motion [Hz], the default of play_trajectory
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True)
-class DesignedMotion:
-    """A designed motion, sampled, and its entry in the JSON of `pprs next-experiment`."""
-
-    promise: dict[str, Any]
-    motion: PlatformMotion | JointMotion
 
 
 class Jobs:
@@ -53,7 +125,7 @@ class Jobs:
     of_kind : dict of str to Job
         The last 'diagnose', 'adopt' and 'experiment'.
     adoption : Adoption or None
-    experiment : DesignedMotion or None
+    experiment : ExperimentResult or None
         The last results.
     """
 
@@ -61,7 +133,7 @@ class Jobs:
         self._ticks = ticks
         self._diagnosis: tuple[TickFits, Diagnosis] | None = None
         self.adoption: Adoption | None = None
-        self.experiment: DesignedMotion | None = None
+        self.experiment: ExperimentResult | None = None
         self.of_kind: dict[str, Job[Any]] = {}
 
     @property
@@ -139,7 +211,7 @@ class Jobs:
             with suppress(TimeoutError, Cancelled, PprsError):
                 job.result(0.1)
 
-    def next_experiment(self, duration: float = 20.0) -> Job[DesignedMotion]:
+    def next_experiment(self, duration: float = 20.0) -> Job[ExperimentResult]:
         """Start the design of the motion that best separates the remaining candidates.
 
         Raises
@@ -150,9 +222,9 @@ class Jobs:
         check_duration(duration)
         fits = self._ticks.fits
 
-        def work(report: Progress) -> DesignedMotion:
-            found: DesignedMotion = run_in_process(_designed, fits.model, fits.recordings, duration,
-                                                   report=report)
+        def work(report: Progress) -> ExperimentResult:
+            found: ExperimentResult = run_in_process(
+                _designed, fits.model, fits.recordings, duration, report=report)
             self.experiment = found
             return found
         return self._begin('experiment', '', work)
@@ -165,7 +237,7 @@ class Jobs:
     def _begin(self, kind: str, of: str, work: Callable[[Progress], Any]) -> Job[Any]:
         with self._ticks.steady():
             self.cancel(kind)
-            job = self.of_kind[kind] = Job(kind, of, work, lambda job: self._ticks.notify())
+            job = self.of_kind[kind] = Job(kind, of, work, self._ticks.notify)
         return job.start()
 
 
@@ -177,8 +249,6 @@ def _diagnosed(model: DriveModel, recordings: Sequence[Recording], reference: Re
 
 
 def _designed(model: DriveModel, recordings: Sequence[Recording], duration: float,
-              progress: Progress) -> DesignedMotion:
-    """Return the motion of `pprs next-experiment`."""
-    found = next_experiment(model, recordings, duration=duration, progress=progress)
-    count = int(found.duration * RATE + 1e-9) + 1
-    return DesignedMotion(found.to_dict(), found.motion(np.arange(count) / RATE))
+              progress: Progress) -> ExperimentResult:
+    return next_experiment(model, recordings, duration=duration,
+                           progress=lambda _, share: progress(share))

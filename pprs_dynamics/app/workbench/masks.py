@@ -1,22 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Selections (brushing): samples in a span of time, or in a region of a scatter plot."""
+"""What is drawn of the recordings: marked samples, scatter plots, the robot in motion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.app.report.charts import extremes
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.physics.model.skeleton import Skeleton
 
 Mask = NDArray[np.bool_]
 """Samples and drives that are meant, (M, D)."""
@@ -25,6 +26,7 @@ EFFORTS = ('measured', 'error before', 'error now')
 MOST_SPANS = 200  # of time, in which samples of a mask lie
 MOST_POINTS = 20_000  # of a scatter
 SHORT = 5  # samples between two spans that count as one
+MOST_POSES = 600  # of the robot in motion
 
 
 def span_mask(ticks: Ticks, start: float, end: float, drives: Sequence[str] | None = None,
@@ -116,3 +118,36 @@ def _on(ticks: Ticks, drives: Sequence[str] | None) -> Mask:
         if name not in known:
             raise SessionError(f'unknown drive {name!r}, must be one of {", ".join(known)}')
     return np.array([[drives is None or name in drives for name in known]])
+
+
+def robot_motion(ticks: Ticks) -> tuple[Skeleton, dict[str, Array]]:
+    """Return F poses of all recordings, one after the other.
+
+    Returns
+    -------
+    drawn : Skeleton
+    arrays : dict of str to array
+        `time` of the residuals (F,) [s], the `points` of the skeleton, and the error of the drives
+        `before` and `now`, (F, D): rms over the samples until the next pose [N].
+    """
+    data = ticks.fits.design.residuals
+    chosen = np.unique(np.linspace(0, len(data) - 1, MOST_POSES).astype(int))
+    found: list[Skeleton] = []
+    first = 0
+    for reconstruction in ticks.fits.design.reconstructions:
+        starts = reconstruction.treat.starts
+        here = chosen[(chosen >= first) & (chosen < first + len(starts))] - first
+        first += len(starts)
+        if len(here):
+            found.append(Skeleton.of(ticks.model, reconstruction.motion[starts[here]]))
+    drawn = replace(found[0], points=np.concatenate([entry.points for entry in found]))
+    return drawn, {'time': data.time[chosen], 'points': drawn.points,
+                   'before': _rms_between(ticks.fits.before, chosen),
+                   'now': _rms_between(ticks.view.residual, chosen)}
+
+
+def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:
+    known = np.isfinite(error)
+    squares = np.add.reduceat(np.where(known, error, 0.0) ** 2, chosen, axis=0)
+    counts = np.add.reduceat(known.astype(float), chosen, axis=0)
+    return np.sqrt(squares / np.maximum(counts, 1.0))

@@ -11,11 +11,9 @@ from typing import Any
 
 from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.jobs import Jobs
 from pprs_dynamics.app.workbench.masks import shares_in, span_mask
-from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
-from pprs_dynamics.app.workbench.ticks import Ticks
+from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
@@ -33,7 +31,7 @@ from pprs_dynamics.system.plain_text import for_json
 class Session:
     """A model, its recordings, and effects that are ticked, shown, adopted and undone.
 
-    Nothing on disk changes before `export` and `save`.
+    Nothing on disk changes before `export`.
 
     Parameters
     ----------
@@ -96,35 +94,6 @@ class Session:
             inputs.checked()
             raise
 
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> Session:
-        """Continue a saved session; errors as `SavedSession.read` and `of`."""
-        saved = SavedSession.read(path)
-        session = cls.of(saved.inputs)
-        session.resume(saved)
-        session.ticks.change_recordings(Inputs.checked)
-        return session
-
-    def resume(self, saved: SavedSession) -> None:
-        """Take over model and ticks of a saved session; errors as `tick` and `choose`."""
-        with self.ticks.steady():
-            self.ticks.use(self.ticks.fits_of(saved.model))
-            for tick in saved.ticks:
-                self.ticks.tick(tick.effect, tick.drives)
-                for key, value in tick.values.items():
-                    self.ticks.choose(tick.effect, key, value)
-            self.ticks.forget()
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write a file for `load`; errors as `SavedSession.write`."""
-        ticks, drives = self.ticks, self.ticks.fits.drives
-        with ticks.steady():
-            saved = SavedSession(ticks.inputs, ticks.model, tuple(
-                SavedTick(name, view_state.names_of(tick.best, drives), {
-                    ticks.fits.key(*place): value for place, value in tick.chosen.items()})
-                for name, tick in ticks.view.ticks.items()))
-        saved.write(path)
-
     def export(self, path: str | PathLike[str], with_ticked: bool = False) -> None:
         """Write the model with its ledger, or with the ticked effects in addition.
 
@@ -183,7 +152,7 @@ class Session:
                 'undoes': ticks.undoes, 'redoes': ticks.redoes,
                 'jobs': {kind: job.to_dict() for kind, job in jobs.of_kind.items()},
                 'adoption': for_json(jobs.adoption.to_dict()) if jobs.adoption else None,
-                'experiment': for_json(jobs.experiment.promise) if jobs.experiment else None,
+                'experiment': for_json(jobs.experiment.to_dict()) if jobs.experiment else None,
                 'recordings': view_state.recordings_to_dict(
                     ticks.inputs.recordings, fits, view.residual),
                 'held_out': [{'key': key, 'name': recording.name}

@@ -25,11 +25,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.fitted_model import (
-    fitted_model,
-    linear_residual,
-    linearised,
-)
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_residual, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
@@ -80,24 +76,6 @@ class Offer:
     gain: float
     evidence: float
     residual: Array = field(repr=False)
-
-
-@dataclass(frozen=True, eq=False)
-class Exact:
-    """A fitted model, evaluated.
-
-    Parameters
-    ----------
-    model : DriveModel
-    residual : (M, D) array
-        Measured minus model [N].
-    parameters : dict of str to dict of str to Estimate, optional
-        By effect, where they were found around the fitted model.
-    """
-
-    model: DriveModel
-    residual: Array = field(repr=False)
-    parameters: dict[str, dict[str, Estimate]] | None = None
 
 
 class TickFits:
@@ -267,11 +245,12 @@ class TickFits:
         """Return the name of a parameter, with its drive's before it."""
         return name if drive is None else f'{self.drives[drive]}.{name}'
 
-    def exact(self, found: CandidateSet, is_free: bool) -> Exact:
-        """Return the fitted model and its residual, evaluated without linearisation.
+    def exact(self, found: CandidateSet, is_free: bool,
+              ) -> tuple[DriveModel, Array, dict[str, dict[str, Estimate]] | None]:
+        """Return the fitted model, and its residual without linearisation, (M, D) [N].
 
         Where an effect of the set is nonlinear, and nothing is held, the set is fitted around
-        its own model first.
+        its own model first, and its parameters are those around the fitted model.
 
         Raises
         ------
@@ -283,4 +262,4 @@ class TickFits:
             fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
-        return Exact(model, self.measured - fits.design.exact_forces(model), parameters)
+        return model, self.measured - fits.design.exact_forces(model), parameters

@@ -12,12 +12,20 @@ from threading import Lock, RLock
 
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench import view_state
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
 from pprs_dynamics.app.workbench.view_state import ViewState
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.physics.model.drive_model import DriveModel
+
+
+class SessionError(PprsError, ValueError):
+    """A request that a session refuses."""
+
+
+class StaleError(SessionError):
+    """A change that counts on a state which is not that of the session any more."""
+
 
 MOST_MOMENTS = 200  # that undo remembers; a moment is a few kilobytes
 
@@ -250,9 +258,9 @@ class Ticks:
             view = self.settle()
         if not view.ticks:
             return self.model
-        if view.exact is None:
+        if view.model is None:
             raise SessionError(f'no model has these values: {view.notice}')
-        return view.exact.model
+        return view.model
 
     # Undo
 
@@ -289,10 +297,6 @@ class Ticks:
 
     def _moment(self, deed: str) -> Moment:
         return Moment(deed, self.model, self.view.ticks, self.fitted_since)
-
-    def forget(self) -> None:
-        """Forget what was done until now."""
-        self._done, self._undone = [], []
 
     def back(self, revision: int | None = None) -> ViewState:
         """Undo the last tick, value or adoption.

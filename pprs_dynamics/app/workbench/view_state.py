@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.workbench.tick_fits import Exact, Offer, Tick, TickFits
+from pprs_dynamics.app.workbench.tick_fits import Offer, Tick, TickFits
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
@@ -91,7 +91,8 @@ class ViewState:
     offers : sequence of Offer
         The unticked effects, the best first; of the set before until `has_offers`.
     has_offers : bool
-    exact : Exact, optional
+    model : DriveModel, optional
+        With the ticked effects, at the last stage.
     notice : str
         Why there is no exact model, where there is none.
     """
@@ -106,7 +107,7 @@ class ViewState:
     without: Mapping[str, CostTerms] = field(default_factory=dict)
     offers: Sequence[Offer] = ()
     has_offers: bool = False
-    exact: Exact | None = None
+    model: DriveModel | None = None
     notice: str = ''
 
     @property
@@ -170,9 +171,9 @@ def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
     view = replace(view, stage=REFINED)
     yield view
     try:
-        exact = fits.exact(view.found, view.is_free)
-        yield replace(view, exact=exact, residual=exact.residual, stage=EXACT,
-                      estimates=exact.parameters or view.estimates)
+        model, residual, estimates = fits.exact(view.found, view.is_free)
+        yield replace(view, model=model, residual=residual, stage=EXACT,
+                      estimates=estimates or view.estimates)
     except PprsError as error:
         yield replace(view, stage=EXACT, notice=str(error))
 

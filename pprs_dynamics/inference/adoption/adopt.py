@@ -58,7 +58,7 @@ def adopt(
     model: DriveModel, request: EffectRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
-    reference: Reference | None = None,
+    reference: Reference | None = None, beside: Sequence[FoundEffect] = (),
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
 
@@ -80,6 +80,8 @@ def adopt(
         Of `original(model)` on the same recordings, with its table; for a curve of the model.
     reference : Reference, optional
         Since which the effect is a change. Errors are then those in addition to its errors.
+    beside : sequence of FoundEffect, optional
+        Effects of the diagnosis that `model` has already.
 
     Raises
     ------
@@ -103,7 +105,7 @@ def adopt(
         found = _with_curve(case, request, report)
     else:
         try:
-            found = _with_effect(case, request)
+            found = _with_effect(case, request, beside)
         except (ModelError, EffectRequestError) as error:
             force = False
             found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
@@ -220,8 +222,8 @@ class _Case:
 # An effect of the catalogue
 
 
-def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
-    """Return the undecided adoption of an effect.
+def _with_effect(case: _Case, request: EffectRequest, beside: Sequence[FoundEffect]) -> Adoption:
+    """Return the undecided adoption of an effect, in addition to others of its row.
 
     Raises
     ------
@@ -234,7 +236,7 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
     answer = Answer(table, row, case.validate)
     candidate = next(c for c in row.effects if c.name == name)
     effect = answer.found(candidate)
-    after, gone = requested_model(answer, request, effect)
+    after, gone = requested_model(answer, (*beside, effect))
     objections = list(_of_table(case, request, table, row, effect))
     if refused := [component.drive for component in row.fits.refused(row.fitted)
                    if component.effect is effect.effect]:
@@ -257,9 +259,12 @@ def _with_effect(case: _Case, request: EffectRequest) -> Adoption:
                        'were tried')
     if others:
         remarks.append(f'The recordings also show {listed(others)}')
-    # The new model has this effect alone, in the value that it has beside the others.
+    # Without the other effects of the row, in the values that they all have together.
+    known = [component for c in row.effects for one in beside if one.name == c.name
+             for component in c.components]
     held_out = [] if case.validate else [
-        hold_out(row.fits, row.fitted, only).error for only in ((), candidate.components)]
+        hold_out(row.fits, row.fitted, only).error
+        for only in (known, (*known, *candidate.components))]
     prefix = f'effects.{name}.'
     return case.adoption(
         request, after, residuals, held_out, effect.gain, tuple(objections), drives=effect.drives,
@@ -314,16 +319,15 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
     return Row(*linearised(fits, fitted), 0.0)
 
 
-def requested_model(answer: Answer, request: EffectRequest, effect: FoundEffect,
+def requested_model(answer: Answer, effects: Sequence[FoundEffect],
                     ) -> tuple[DriveModel, tuple[str, ...]]:
-    """Return the input model with the requested effect alone, and where the effect is removed.
+    """Return the input model with some effects alone, and where the last of them is removed.
 
     Parameters
     ----------
     answer : Answer
-        Of the row that has the effect.
-    request : EffectRequest
-    effect : FoundEffect
+        Of the row that has the effects.
+    effects : sequence of FoundEffect
 
     Raises
     ------
@@ -331,37 +335,37 @@ def requested_model(answer: Answer, request: EffectRequest, effect: FoundEffect,
         For values that no model may have.
     """
     base, placed = parts_of(answer.fits, answer.fitted)
-    model = model_at(answer.design, base, [
-        each for each in placed if each.effect.name == request.name])
+    known = {effect.name: effect.parameters for effect in effects}
+    model = model_at(answer.design, base, [each for each in placed if each.effect.name in known])
     given = answer.design.given.values.get('effects.active') or ()
-    known = {request.name: effect.parameters, **{
-        each.name: estimate_present(answer.fits, answer.fitted, each)
-        for each in model.effects if each.name != request.name and each.name in given
-        and isinstance(each, (DriveEffect, StructureEffect))}}
+    known = {**{each.name: estimate_present(answer.fits, answer.fitted, each)
+                for each in model.effects if each.name in given
+                and isinstance(each, (DriveEffect, StructureEffect))}, **known}
     values = dict(model.values)
     for name, parameters in known.items():
         values.update({
             f'{UNCERTAINTIES}.{name}.{key}': float(f'{number.std:.3g}')
             for key, number in parameters.items()
             if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
-    gone = _gone(answer, request, effect)
-    removed = tuple(f'{block}.{request.name}.{place}' for block in ('effects', UNCERTAINTIES)
-                    for place in gone)
-    values = {key: value for key, value in values.items()
-              if not (removed and key.startswith(removed))}
-    if not any(key.startswith(f'effects.{request.name}.') for key in values):
-        values['effects.active'] = [name for name in values['effects.active']
-                                    if name != request.name]
+    for effect in effects:
+        gone = _gone(answer, effect)
+        removed = tuple(f'{block}.{effect.name}.{place}' for block in ('effects', UNCERTAINTIES)
+                        for place in gone)
+        values = {key: value for key, value in values.items()
+                  if not (removed and key.startswith(removed))}
+        if not any(key.startswith(f'effects.{effect.name}.') for key in values):
+            values['effects.active'] = [name for name in values['effects.active']
+                                        if name != effect.name]
     return replace(DriveModel.from_parameters(values), source=model.source), gone
 
 
 @outside_cost('adopt removes an effect of the model of which the recordings show none')
-def _gone(answer: Answer, request: EffectRequest, found: FoundEffect) -> tuple[str, ...]:
+def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
     """Return where the input model has the effect and the recordings show none of it.
 
     As the beginnings of keys: `drive.`, `link.`, or '' for all of it.
     """
-    effect, design = request.effect, answer.design
+    effect, design = found.effect, answer.design
     candidate = next(c for c in answer.fitted.effects if c.name == effect.name)
     sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
         p.name.endswith('mass') or not issubclass(effect, AddedBody))}

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The adoption loop: diagnose, adopt, diagnose again, until nothing is reported."""
+"""The adoption of all effects that a diagnosis reports."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,10 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import for_json
 
-MOST_STEPS = 8
 REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
 
 
@@ -32,7 +30,7 @@ class AdoptionRun:
     Parameters
     ----------
     steps : tuple of Adoption
-        Those that were refused are among them.
+        Those that were refused at the end are the last ones.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
     reason : str
     model : DriveModel
@@ -62,11 +60,11 @@ def adopt_all(
     progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
 ) -> AdoptionRun:
-    """Adopt the reported effects until a diagnosis reports nothing or is ambiguous.
+    """Adopt the effects that one diagnosis reports, in the values that they have together.
 
-    Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
-    error, and which of them it is another recording must show. What is refused is left out
-    until something else has been adopted, and the run goes on with what else was found.
+    What is refused is tried again after another effect was adopted. Of effects that explain the
+    recordings alike, the best is adopted as the last: it lowers the error, and which of them it is
+    another recording must show.
 
     Parameters
     ----------
@@ -80,7 +78,7 @@ def adopt_all(
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     diagnosis : Diagnosis, optional
-        Of the model as given, where it is known already; its decisions hold for all others.
+        Of the model as given, where it is known already.
     reference : Reference, optional
         As in `adopt`.
 
@@ -90,49 +88,43 @@ def adopt_all(
         As `measure_residuals`.
     """
     report = progress or (lambda what, share: None)
+    given = original(model)
+    if diagnosis is None or given is not model:
+        diagnosis = diagnose(given, recordings, (), lambda share: report('diagnosing', share),
+                             reference=reference)
+    rivals = {names[0] for names in diagnosis.indistinguishable}
+    open_effects = sorted(diagnosis.effects, key=lambda effect: effect.name in rivals)
     steps: list[Adoption] = []
+    adopted: list[FoundEffect] = []
     refused: list[Adoption] = []
-    decisions = (DECISIONS if diagnosis is None or diagnosis.selection is None
-                 else diagnosis.selection.first.decisions)
-    if original(model) is not model:
-        diagnosis = None
-    while True:
-        if diagnosis is None:
-            diagnosis = diagnose(original(model), recordings, (),
-                                 lambda share: report('diagnosing', share), decisions,
-                                 reference=reference)
-        found = _next(diagnosis, {step.effect for step in refused})
-        if found is None or sum(step.adopted for step in steps) == MOST_STEPS:
-            return AdoptionRun(tuple(steps), *_end(diagnosis, refused), model)
-        name = found.name
-        step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
-                     progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
-                     diagnosis=diagnosis, reference=reference)
-        steps.append(step)
+    while len(refused) < len(open_effects):
+        # First what was not refused beside the effects that are adopted already.
+        effect = open_effects[len(refused)]
+        report(f'adopting {effect.name}', len(adopted) / len(diagnosis.effects))
+        step = adopt(model, EffectRequest(effect.effect, effect.drives), recordings, validate,
+                     diagnosis=diagnosis, reference=reference, beside=adopted)
         if not step.adopted:
             refused.append(step)
             continue
-        model, refused, diagnosis = record(step), [], None
-        if step.rivals:
-            return AdoptionRun(tuple(steps), AMBIGUOUS, (
-                f'{listed(step.rivals, "or")} explains these recordings as well as {name}. Another '
-                'motion separates them'), model)
+        model = record(step)
+        steps.append(step)
+        adopted.append(effect)
+        open_effects.remove(effect)
+        refused = []
+    return AdoptionRun((*steps, *refused), *_end(diagnosis, steps, refused), model)
 
 
-def _end(diagnosis: Diagnosis, refused: Sequence[Adoption]) -> tuple[str, str]:
-    """Return how a run ends after its last diagnosis, and why."""
+def _end(diagnosis: Diagnosis, steps: Sequence[Adoption], refused: Sequence[Adoption],
+         ) -> tuple[str, str]:
+    """Return how a run ends, and why."""
     if refused:
         return REFUSED, '; '.join(f'{step.effect}: {step.reason}' for step in refused)
+    if steps and steps[-1].rivals:
+        return AMBIGUOUS, (f'{listed(steps[-1].rivals, "or")} explains these recordings as well as '
+                           f'{steps[-1].effect}. Another motion separates them')
     if diagnosis.verdict != 'unknown':
         return 'adequate', 'the remaining error does not differ from noise'
     return 'unknown', (
         f'no effect of the catalogue explains what remains: {diagnosis.depends_on[0].text}'
         if diagnosis.depends_on else
         'the remaining error is larger than the noise, and no effect is supported')
-
-
-def _next(diagnosis: Diagnosis, refused: Set[str]) -> FoundEffect | None:
-    """Return what to adopt: those that are certain first, an ambiguous one as the last."""
-    ambiguous = {name for names in diagnosis.indistinguishable for name in names}
-    new = [effect for effect in diagnosis.effects if effect.name not in refused]
-    return min(new, key=lambda effect: effect.name in ambiguous, default=None)

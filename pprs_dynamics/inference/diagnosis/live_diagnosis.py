@@ -6,21 +6,16 @@
 A window is diagnosed as a recording. Its effects are claimed once the model that was fitted to it
 predicts the next window better than the model without them, and the diagnosis of that window
 reports them again. An effect is withdrawn when the latest window neither reports nor needs it. It
-began where the cumulated difference of the two models' whitened squared errors is lowest: the
-maximum-likelihood change point between two known models (Hinkley, Biometrika 57, 1970).
+began where the first window that reports it says: within that window, or with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
 from typing import Any
 
-import numpy as np
-
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -30,7 +25,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 )
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.held_out import predictive_gain, sample_gains
+from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -42,9 +37,6 @@ CERTAINTY = 2.0
 # Share of a window's samples in which some drive moves, below which it is not diagnosed, and share
 # of a drive's highest speed above which it moves.
 LEAST_MOTION, MOVING = 0.2, 0.02
-# Windows before the confirming one, in which the beginning of a change is looked for: the first
-# that reported it, and the one before.
-RECENT = 2
 MOST_VALUES = 3  # of an effect in its sentence
 
 
@@ -128,9 +120,6 @@ class LiveDiagnosis:
         Claimed before, and gone with the latest window.
     note : str
         Why the latest window was not diagnosed; empty where it was.
-    recent : tuple of (Recording, float)
-        The latest windows and when they begin [s], in which the beginning of a change is looked
-        for.
     reference : Reference, optional
         Since which every window is diagnosed.
     """
@@ -140,7 +129,6 @@ class LiveDiagnosis:
     last: Window | None = None
     withdrawn: tuple[LiveEffect, ...] = ()
     note: str = ''
-    recent: tuple[tuple[Recording, float], ...] = ()
     reference: Reference | None = None
 
     @property
@@ -193,22 +181,21 @@ class LiveDiagnosis:
         answer = diagnose(self.model, [recording], reference=self.reference)
         window = Window((start, start + float(recording.time[-1] - recording.time[0])),
                         answer.to_dict(), answer.adopted, without_found(self.model, answer))
-        recent = (*self.recent, (recording, start))
-        holds = self._holds(recording)
-        effects, beginning = [], cache(lambda: beginning_of(window, recent))
+        holds, effects = self._holds(recording), []
         for found in answer.effects:
+            begun = None if self.last is None else start
             effect = LiveEffect(found, frozenset({found.name}).union(*(
-                names for names in answer.indistinguishable if found.name in names)))
+                names for names in answer.indistinguishable if found.name in names)),
+                begun if found.course is None else start + found.course.begin)
             known = next((present for present in self.effects if present.is_same(effect)), None)
-            if known is not None and (known.confirmed or holds):
-                effect = replace(effect, confirmed=True,
-                                 since=known.since if known.confirmed else beginning())
+            if known is not None:
+                effect = replace(effect, confirmed=known.confirmed or holds, since=known.since)
             effects.append(effect)
         missed = [present for present in self.claimed
                   if not any(present.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.
         return replace(self, effects=(*effects, *(missed if holds else ())), last=window, note='',
-                       recent=recent[-RECENT:], withdrawn=() if holds else tuple(missed))
+                       withdrawn=() if holds else tuple(missed))
 
     def _holds(self, recording: Recording) -> bool:
         """Return whether the model of the last window predicts a recording better.
@@ -223,17 +210,6 @@ class LiveDiagnosis:
             for model in (self.model, self.last.plain))
 
 
-def beginning_of(window: Window, recent: Sequence[tuple[Recording, float]]) -> float | None:
-    """Return when the change that a window has came, in recent windows [s]."""
-    gains, times = [], []
-    for recording, start in recent:
-        before, after = (measure_residuals(model, [recording])[0]
-                         for model in (window.plain, window.adopted))
-        gains.append(sample_gains(before, after)[0].sum(axis=1))
-        times.append(start + before.time - before.time[0])
-    return change_point(np.concatenate(times), np.concatenate(gains))
-
-
 def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
     """Return the model of a diagnosis without its effects, with its fitted numbers."""
     found = {effect.name for effect in answer.effects}
@@ -242,22 +218,3 @@ def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
         given.get(effect.name, effect) if effect.name in found else effect
         for effect in answer.adopted.effects
         if effect.name not in found or effect.name in given))
-
-
-def change_point(time: Array, gains: Array) -> float | None:
-    """Return when a model with a change becomes the better one.
-
-    Parameters
-    ----------
-    time, gains : (M,) arrays
-        Times [s], and whitened squared error of the model without the change less that of the
-        model with it: negative before, positive after.
-
-    Returns
-    -------
-    float or None
-        None where it is the better one from the first sample on.
-    """
-    cumulated = np.concatenate(([0.0], np.cumsum(gains)))
-    first = int(np.argmin(cumulated))
-    return None if first == 0 else float(time[min(first, len(time) - 1)])

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_fit import Fitted, FittedNumber, fit_arm
 from pprs_dynamics.inference.regression.design import Design
@@ -31,9 +30,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import for_json
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
-WHERE = {RECORDINGS: 'recordings predicted from the others',
-         HALVES: 'its halves, each predicted from the other,',
-         VALIDATION: 'the validation recordings'}
 PART_OF_IT = ('what was wrong with the robot in these runs is part of the model now: fit healthy '
               'runs without load, and diagnose others')
 
@@ -54,8 +50,8 @@ class BaseFit:
         What the motion determines and what it does not, as sentences.
     before, after : dict of str to float
         rms error by drive on the recordings: of the input model, and of the fitted one.
-    held_out_before, held_out : dict of str to float
-        The same on held-out data.
+    held_out : dict of str to float
+        That of the fitted model on held-out data.
     held_out_on : {'recordings', 'halves', 'validation'}
         Each recording, or half of the only one, predicted from the others; or the validation.
     explained : dict of str to float
@@ -69,25 +65,10 @@ class BaseFit:
     notes: tuple[str, ...]
     before: dict[str, float]
     after: dict[str, float]
-    held_out_before: dict[str, float]
     held_out: dict[str, float]
     held_out_on: str
     explained: dict[str, float]
     little: dict[str, float]
-
-    @property
-    def ratio(self) -> float:
-        """Held-out error over that of the input model; drives of different sizes count alike."""
-        return root_mean_square([after / max(self.held_out_before[drive], 1e-300)
-                                 for drive, after in self.held_out.items()])
-
-    @property
-    def change(self) -> str:
-        """The change of the held-out error as a sentence, and whether the fit is taken."""
-        text = (f'the error on {WHERE[self.held_out_on]} is {self.ratio:.3g} of that before, over '
-                'all drives')
-        return f'{text}: base model fitted again' if self.ratio < 1 else (
-            f'{text}, must fall: the base model stays as it was')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fit for JSON."""
@@ -123,7 +104,9 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
     PprsError
         As `measure_residuals`.
     """
-    require_open_numbers(model)
+    if not model.moves_joints and not model_numbers(model):
+        raise FitError('tolerances: the model gives none, must name the numbers that are to be '
+                       'fitted, e.g. masses.payload: 0.05')
     report = progress or (lambda share: None)
     fitted, numbers, notes = _fitted(model, recordings)
     report(0.4)
@@ -137,17 +120,9 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
                  for k, part in enumerate(parts)]
     report(0.9)
     before, after = (measure_residuals(each, recordings)[0] for each in (model, fitted))
-    held_out_before = _errors([(model, validate)]) if validate else rms_by_drive(before)
     return BaseFit(fitted, numbers, (*notes, PART_OF_IT), rms_by_drive(before),
-                   rms_by_drive(after), held_out_before, _errors(folds), on,
+                   rms_by_drive(after), _errors(folds), on,
                    explained_shares(after), little_explained(fitted, after))
-
-
-def require_open_numbers(model: DriveModel) -> None:
-    """Raise FitError where a model has nothing that a fit may move."""
-    if not model.moves_joints and not model_numbers(model):
-        raise FitError('tolerances: the model gives none, must name the numbers that are to be '
-                       'fitted, e.g. masses.payload: 0.05')
 
 
 def halves(recording: Recording) -> list[Recording]:

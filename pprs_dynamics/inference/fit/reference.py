@@ -35,7 +35,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior
+from pprs_dynamics.inference.fit.arm_fit import base_numbers, base_prior, reconstructed
 from pprs_dynamics.inference.fit.repeating_forces import (
     Integers,
     Process,
@@ -51,12 +51,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
-from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
-from pprs_dynamics.inference.residuals.reconstruction import (
-    CHUNK,
-    Reconstruction,
-    reconstruct,
-)
+from pprs_dynamics.inference.residuals.reconstruction import CHUNK, Reconstruction
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -70,7 +65,6 @@ FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
 LEAST_COUNT = 1.0  # determined coefficients, over which the size of a process is taken
-LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
 FINER = 8  # points for each sample of a reference, among which the nearest is looked for
@@ -100,12 +94,10 @@ class Reference:
     repeats : (D,) array
         Correlation of the processes in two runs.
     base : (N, P) array
-        Directions of unit variance of the base's numbers, those determined by the reference first.
-    determined : int
-        How many of these are determined.
+        Directions of unit variance of the base's numbers.
     root : (Q, Q) array
-        Of the covariance of the coefficients: of determined directions, then of the processes of
-        every drive.
+        Of the covariance of the coefficients: of these directions, then of the processes of every
+        drive.
     regression, fit : Regression, JointFit
     """
 
@@ -115,7 +107,6 @@ class Reference:
     size: Array
     repeats: Array
     base: Array
-    determined: int
     root: Array
     regression: Regression
     fit: JointFit
@@ -131,14 +122,14 @@ class Reference:
         PprsError
             As `measure_residuals`.
         """
-        found, residuals = _measured(model, recordings)
+        found, residuals = reconstructed(model, recordings)
         names = ', '.join(recording.name for recording in recordings)
         if len(residuals) < LEAST_LENGTH:
             raise ReferenceRunError(
                 f'{names}: too short for a reference, {len(residuals)} samples after treatment, '
                 f'must be at least {LEAST_LENGTH}: record a longer run')
-        columns, base = _base(model, found, residuals)
-        drives, determined = range(len(residuals.drives)), columns.shape[2]
+        columns, base = _base(model, found, residuals.measured)
+        drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
         processes = _processes(residuals, columns, measured, model.gear_ratios)
         features = _features(processes, *motion_of(residuals), residuals.period)
@@ -151,7 +142,7 @@ class Reference:
         _require_same_robot(model, residuals, columns, fit, names)
         values, axes = np.linalg.eigh(fit.covariance)
         return cls(model, tuple(recordings), processes, size,
-                   _repeats(regression, fit, determined, _parts(residuals)), base, determined,
+                   _repeats(regression, fit, base.shape[1], _parts(residuals)), base,
                    axes * np.sqrt(np.maximum(values, 0.0)), regression, fit)
 
     @property
@@ -173,26 +164,23 @@ class Reference:
 
     def shown_by(self, recordings: Sequence[Recording]) -> Array:
         """Return the forces that recordings and it have beyond the model, (M, D) [N]."""
-        found, residuals = _measured(self.model, recordings)
+        found, residuals = reconstructed(self.model, recordings)
         return self._carried_over(residuals, found).shown(residuals)
 
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
                       ) -> CarriedOver:
-        count, determined = len(self.size), self.determined
         q, v = motion_of(residuals)
         known = _features(self.processes, q, v, residuals.period)
         shared = self.processes[0][0].new(q, v, known[0][0])
-        numbers = (_numbers(self.model, reconstructions) @ self.base if self.base.size
-                   else np.zeros((len(q), count, 0)))
-        of_base = numbers[..., :determined] @ self.fit.coefficients[:determined]
+        numbers, _ = _base(self.model, reconstructions, residuals.measured, self.base)
+        count = numbers.shape[2]
+        of_base = numbers @ self.fit.coefficients[:count]
         together, apart = [], []
         for d, place in enumerate(self._places(known)):
             new = [shared, *(process.new(q, v, features) for process, features in zip(
                 self.processes[d][1:], known[d][1:], strict=True))]
             here, repeats = np.concatenate(known[d], axis=1), self.repeats[d]
-            together.append(np.concatenate((
-                numbers[:, d, :determined] @ self.root[:determined]
-                + repeats * here @ self.root[place], numbers[:, d, determined:]), axis=1))
+            together.append(numbers[:, d] @ self.root[:count] + repeats * here @ self.root[place])
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * _sizes(self.size[d], known[d]) * here,
                 *(size * features for size, features in zip(self.size[d], new, strict=True))),
@@ -205,7 +193,7 @@ class Reference:
 
     def _places(self, features: Sequence[Sequence[Array]]) -> list[slice]:
         """Return the places of the coefficients of each drive's processes."""
-        ends = self.determined + np.cumsum(
+        ends = self.base.shape[1] + np.cumsum(
             [0, *(sum(part.shape[1] for part in of_drive) for of_drive in features)])
         return [slice(int(start), int(end)) for start, end in pairwise(ends)]
 
@@ -306,32 +294,14 @@ def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array,
             'of this robot on a day on which its model was right')
 
 
-def _base(model: DriveModel, found: Sequence[Reconstruction], residuals: Residuals,
-          ) -> tuple[Array, Array]:
-    """Return columns (M, D, P) of determined directions of the base, and all directions."""
+def _base(model: DriveModel, found: Sequence[Reconstruction], efforts: Array,
+          prior: Array | None = None) -> tuple[Array, Array]:
+    """Return columns (M, D, P) of unit variance of the base's numbers, and that prior, (N, P)."""
     if not model.is_mechanism:
-        return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0))
-    numbers = _numbers(model, found)
-    prior = base_prior(model, residuals.measured, numbers)
-    columns = numbers @ prior
-    known = np.isfinite(residuals.error).any(axis=0)
-    noise = np.nanmean(residuals.error[:, known] ** 2, axis=0)
-    values, axes = np.linalg.eigh(np.einsum(
-        'mdp,mdq,d->pq', columns[:, known], columns[:, known], 1 / noise, optimize=True))
-    axes = axes[:, ::-1]
-    return columns @ axes[:, :int(np.sum(values > LEAST_INFORMATION))], prior @ axes
-
-
-def _measured(model: DriveModel, recordings: Sequence[Recording],
-              ) -> tuple[list[Reconstruction], Residuals]:
-    found = [reconstruct(model, recording) for recording in recordings]
-    return found, join_tables(model, [treated_table(model, motion) for motion in found])
-
-
-def _numbers(model: DriveModel, found: Sequence[Reconstruction]) -> Array:
-    """Return the columns of a base's numbers on recordings, (M, n, P)."""
-    return np.concatenate([ArmColumns.of_motion(model, motion).numbers(model)
-                           for motion in found])
+        return np.zeros((*efforts.shape, 0)), np.zeros((0, 0))
+    numbers = base_numbers(model, found)
+    prior = base_prior(model, efforts, numbers) if prior is None else prior
+    return numbers @ prior, prior
 
 
 def _features(processes: Processes, q: Array, v: Array, period: float) -> list[list[Array]]:
@@ -416,7 +386,7 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
     return tuple(found)
 
 
-def _repeats(regression: Regression, fit: JointFit, determined: int, parts: Integers) -> Array:
+def _repeats(regression: Regression, fit: JointFit, of_base: int, parts: Integers) -> Array:
     """Return the correlation of the process in two runs of each drive, (D,).
 
     Each part is predicted from the others. What its errors are from that, beyond noise and what
@@ -445,8 +415,8 @@ def _repeats(regression: Regression, fit: JointFit, determined: int, parts: Inte
             left = part[-1] - coefficients[index] @ part[:-1]
             expected = part.shape[1] + np.sum(
                 (covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
-            process = part[determined:-1]
-            known[d] += (np.sum(process ** 2 / precision[index[determined:], None]),
+            process = part[of_base:-1]
+            known[d] += (np.sum(process ** 2 / precision[index[of_base:], None]),
                          left @ left - expected)
     weight = (DECISIONS.run_repeats_spread * 2) ** -2
     apart = (known[:, 1] + weight * 2 * (1 - DECISIONS.run_repeats)) / (known[:, 0] + weight)

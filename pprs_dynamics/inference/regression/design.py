@@ -197,21 +197,22 @@ class Design:
         return replace(design, residuals=residuals, point=point, _exact=self._exact)
 
     def _unmoved(self, point: OperatingPoint) -> dict[str, Array]:
-        """Return the columns that another operating point does not change noticeably.
+        """Return the columns that are not computed again around another operating point.
 
-        Effects in drives add no load. Sensors of efforts change all columns but those of positions,
-        and what positions are off by only changes when friction turns over. Numbers move within
-        tolerances, which changes columns by products of small shares.
+        Exact forces are known there, so that columns only say how forces change from there on.
+        Those of numbers, which move within tolerances, and of positions stay (a chord method).
+        Effects in drives add no load: they change no other column, but for sensors of efforts,
+        which show all of them otherwise, and for errors of positions, with which friction turns
+        over at other times.
         """
         effects = {e.effect for at in (point, self.point) if at is not None for e in at.effects}
-        if not all(issubclass(effect, DriveEffect) for effect in effects):
-            return {}
-        if any(issubclass(effect, MeasurementEffect) and not effect.shifts_positions()
-               for effect in effects):
-            return {name: self.columns[name] for name in (HOMING, INERTIA) if name in self.columns}
-        turning = ((NUMBERS, OF_DRIVES, OF_JOINTS)
-                   if any(effect.shifts_positions() for effect in effects) else ())
-        return {name: column for name, column in self.columns.items() if name not in turning}
+        is_alike = all(issubclass(effect, DriveEffect) and (
+            effect.shifts_positions() or not issubclass(effect, MeasurementEffect))
+            for effect in effects)
+        turning = any(effect.shifts_positions() for effect in effects)
+        return {name: column for name, column in self.columns.items()
+                if name in (NUMBERS, HOMING, INERTIA)
+                or (is_alike and not (turning and name in (OF_DRIVES, OF_JOINTS)))}
 
     def beside(self, carried: CarriedOver | None) -> Design:
         """Return this with what a reference says of the recordings, or unchanged for None."""

@@ -11,7 +11,7 @@ follow a delay that is none, and make good what it does to the forces.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,59 +34,70 @@ from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 TURNS_OVER = 0.002
 
 
-def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
-    """Return what a term's friction changes by if it reverses in other widths, (w, M) [N].
+def reversal_rows(design: Design, term: Term, units: Array) -> Array:
+    """Return what a term's friction changes by if it reverses in other widths, (u, w, M) [N].
 
-    None, (0, M), for an effect that is no friction.
+    None, (u, 0, M), for an effect that is no friction.
 
     Parameters
     ----------
     design : Design
     term : Term
-    coefficients : (k,) array
-        By which its rows are multiplied.
+    units : (u, k) array
+        Sets of coefficients by which its rows are multiplied.
     """
     effect = term.effect
     if term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect):
-        return np.zeros((0, len(design.residuals)))
+        return np.zeros((len(units), 0, len(design.residuals)))
     d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
     slowest = max(width, TURNS_OVER * design.covered[d].top_speed)
     widths = np.array([factor * (width if factor < 1 else slowest) for factor in DRIVE_WIDTHS])
 
-    def rows(recording: FullRate) -> Array:
+    def rows(recording: FullRate) -> list[Array]:
         samples = recording.samples(slice(None), d)
-        forward, backward, still = (coefficients @ recording.columns(effect, d, term.shape, sign)
+        forward, backward, still = (units @ recording.columns(effect, d, term.shape, sign)
                                     for sign in (1.0, -1.0, 0.0))
-        return np.stack(reversal_columns(
+        return reversal_columns(
             (forward - backward) / 2, samples.velocity, samples.direction, widths,
-            (forward + backward) / 2 - still))
+            (forward + backward) / 2 - still)
 
-    return design.treated(rows)
+    return _treated(design, len(units), rows)
 
 
-def deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
-    """Return what real forms of a term's effect may add to its force, (w, M) [N]."""
+def deviation_rows(design: Design, term: Term, units: Array) -> Array:
+    """Return what real forms of a term's effect may add to its force, (u, w, M) [N].
+
+    See `reversal_rows`.
+    """
     effect = term.effect
     if term.drive is None or not issubclass(effect, DriveEffect):
-        return np.zeros((0, len(design.residuals)))
+        return np.zeros((len(units), 0, len(design.residuals)))
     d = term.drive
     if issubclass(effect, MeasurementEffect):
-        def read(recording: FullRate) -> Array:
+        def read(recording: FullRate) -> list[Array]:
             parts = [np.stack(effect.sensor_deviations(design.sensed(
                 recording.effort[None, part, d], recording, part, d, effect)[0],
                 recording.samples(part, d), **term.shape)) for part in recording.segments]
-            return np.concatenate(parts, axis=1)
+            return [np.tile(row, (len(units), 1)) for row in np.concatenate(parts, axis=1)]
 
         two = design.recordings[0].samples(slice(2), d)
         has_any = effect.sensor_deviations(two.velocity, two, **term.shape)
-        return design.treated(read) if has_any else np.zeros((0, len(design.residuals)))
+        return (_treated(design, len(units), read) if has_any
+                else np.zeros((len(units), 0, len(design.residuals))))
 
-    def rows(recording: FullRate) -> Array:
-        found = effect.deviations(recording.samples(slice(None), d), **term.shape)
-        return np.reshape([coefficients @ np.stack(one) for one in found],
-                          (len(found), len(recording.time)))
+    return _treated(design, len(units), lambda recording: [
+        units @ np.stack(one)
+        for one in effect.deviations(recording.samples(slice(None), d), **term.shape)])
 
-    return design.treated(rows)
+
+def _treated(design: Design, count: int, rows: Callable[[FullRate], Sequence[Array]]) -> Array:
+    """Return w rows for each of `count` units, (u, N) of a recording, treated, (u, w, M)."""
+    def flat(recording: FullRate) -> Array:
+        found = rows(recording)
+        return np.reshape(found, (len(found) * count, len(recording.time)))
+
+    treated = design.treated(flat)
+    return treated.reshape(len(treated) // count, count, treated.shape[1]).swapaxes(0, 1)
 
 
 def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dict[int, Array]:

@@ -34,8 +34,7 @@ from pprs_dynamics.physics.model.keys import GAIN
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-# Of slow columns, see `Samples`; in a closed form friction follows positions more closely.
-NODES_PER_PERIOD, CLOSED_FORM_NODES = 60, 120
+NODES_PER_PERIOD = 40  # of slow columns, see `Samples`
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
@@ -140,6 +139,7 @@ class Sensitivities:
                             for effect in catalogue().values())
         self.known = frozenset[str]()
         self.is_planned = False
+        self._steps: dict[type[BodyEffect], list[BodyEffect]] = {}  # by coefficient
         self._inertial: dict[type[AddedBody], Array] = {}
         self._links: tuple[Any, Array] = None, np.empty(0)  # state, and its regressor
         self._own: tuple[Any, Array] = None, np.empty(0)  # state, and efforts of the model there
@@ -174,17 +174,15 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
-        is_closed_form = self.model.robot.structure is None
-        slow = samples = Samples.of(
-            state, treat, [effect for effect in self.model.effects
-                           if isinstance(effect, MeasurementEffect)],
-            CLOSED_FORM_NODES if is_closed_form else NODES_PER_PERIOD)
-        if is_closed_form:
+        slow = samples = Samples.of(state, treat, [effect for effect in self.model.effects
+                                                   if isinstance(effect, MeasurementEffect)])
+        if self.model.robot.structure is None:
             # Friction follows the loads of the closed form: splines would be 1 % off.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
         columns: dict[str, Array] = {}
         if NUMBERS not in self.known:
             columns[NUMBERS] = self._of_numbers(forces, samples)
+        if OF_DRIVES not in self.known:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
                 np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
@@ -336,11 +334,13 @@ class Sensitivities:
             if self.is_planned and self.model.robot.structure is not None:
                 rigid = self._of_rigid_bodies(effect, state)
                 return rigid, rigid
-        values = {} if present is None else effect.to_coefficients(present.values)
+        if effect not in self._steps:
+            values = {} if present is None else effect.to_coefficients(present.values)
+            self._steps[effect] = [effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
+                                   for c in effect.coefficients]
         before = self._own_efforts(state)
         full, bare = [], []
-        for c in effect.coefficients:
-            moved = effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
+        for c, moved in zip(effect.coefficients, self._steps[effect], strict=True):
             found = moved.apply(state) if present is None else self._at(replace(
                 self.model, effects=tuple(moved if one is present else one
                                           for one in self.model.effects)), state)
@@ -389,12 +389,11 @@ class Samples:
     nodes: Any
 
     @classmethod
-    def of(cls, state: Any, treat: Treatment, sensors: Sequence[MeasurementEffect],
-           per_period: int) -> Samples:
-        """Return the samples of a motion, with so many nodes per period of its fastest part."""
+    def of(cls, state: Any, treat: Treatment, sensors: Sequence[MeasurementEffect]) -> Samples:
+        """Return the samples of a motion, with nodes by the period of its fastest part."""
         count = len(state.velocity)
         period = min(1 / max(bandwidth(state.acceleration), 1e-300), count)
-        stride = int(period / per_period)
+        stride = int(period / NODES_PER_PERIOD)
         if stride < 2:
             return cls(state, treat, sensors, np.arange(count), state)
         at = np.round(np.linspace(0, count - 1, -(-(count - 1) // stride) + 1)).astype(int)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -75,9 +76,13 @@ class DriveComponents:
         self.regression, self.d = regression, d
         self.series = regression.series[d]
         self.design = design
-        self.effects = [effect for effect in searched_in_drives(design)
-                        if design.acts_on(effect, d) and not effect.shifts_positions()]
         self._places: dict[type[DriveEffect], slice] = {}
+
+    @lazy
+    def effects(self) -> list[type[DriveEffect]]:
+        """Effects that the drive may have, without those that all drives feel."""
+        return [effect for effect in searched_in_drives(self.design)
+                if self.design.acts_on(effect, self.d) and not effect.shifts_positions()]
 
     @lazy
     def score_test(self) -> ScoreTest[Component]:
@@ -93,6 +98,14 @@ class DriveComponents:
             first += len(rows)
             parts.append(rows)
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
+
+    def around(self, regression: Regression) -> DriveComponents:
+        """Return the same effects for the same samples around another operating point."""
+        found = copy(self)
+        found.regression, found.series = regression, regression.series[self.d]
+        if 'score_test' in vars(self):
+            found.score_test = self.score_test.around(regression)
+        return found
 
     def rows_of(self, effect: type[DriveEffect]) -> Array:
         """Return what an effect does in all shapes tried, (k, n), transformed."""
@@ -173,6 +186,12 @@ class Components:
         self._nuisance: dict[Component, Mapping[str, dict[int, Array]]] = {}
         self._prior_costs: dict[Component, CostTerms] = {}
         self.local = {d: DriveComponents(design, regression, d) for d in regression.drives}
+
+    def propose_as(self, other: Components) -> None:
+        """Take the rows of scans from another operating point, as they only propose."""
+        self.local = {d: other.local[d].around(self.regression) for d in self.local}
+        if 'score_test' in vars(other):
+            self.score_test = other.score_test.around(self.regression)
 
     @cached_property
     def structure(self) -> list[Component]:
@@ -335,12 +354,11 @@ class Components:
         """
         if component not in self._nuisance:
             term, d = self.term(component), component.drive
-            units = np.eye(max(len(component.names), 1))
+            units = np.stack([component.every(unit)
+                              for unit in np.eye(max(len(component.names), 1))])
             kinds = {REVERSAL: joint_reversal_rows(self.design, term, component.names)} if (
-                d is None) else {
-                kind: {d: np.stack([rows(self.design, term, component.every(unit))
-                                    for unit in units])}
-                for kind, rows in ((REVERSAL, reversal_rows), (FORM, deviation_rows))}
+                d is None) else {kind: {d: rows(self.design, term, units)} for kind, rows in (
+                    (REVERSAL, reversal_rows), (FORM, deviation_rows))}
             weight = 1.0 if component.course is None else self._weight(component.course)
             self._nuisance[component] = {kind: transformed for kind, rows in kinds.items() if (
                 transformed := {
@@ -396,6 +414,8 @@ class Components:
         return force
 
     def release(self) -> None:
-        """Let go of what scans need; it is computed again if it is asked for."""
-        for one in (self, *self.local.values()):
-            vars(one).pop('score_test', None)
+        """Let go of products that only further scans would need."""
+        both: tuple[Components | DriveComponents, ...] = (self, *self.local.values())
+        for one in both:
+            if 'score_test' in vars(one):
+                one.score_test = one.score_test.around(one.regression)

@@ -154,8 +154,7 @@ def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, Cand
         point = next_operating_point(fits, fitted)
         if point is None:
             break
-        fits = FittedSets(fits.design.around(point, alone=True), fits.decisions,
-                          fits.regression.error_scale)
+        fits = fits.around(point, alone=True)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
     return fits, fitted
 
@@ -168,17 +167,19 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
     """
     design = fits.design
     base, effects = parts_of(fits, fitted)
-    linear = linear_prediction(fits, fitted)
-    measured = fits.regression.residuals.measured
-    target = model_at(design, base, effects)
-    exact = design.exact_forces(target)
-    before = design.point
-    if (squared(fits, fitted, exact - linear) < LEAST_DIFFERENCE
-            and _has_nonlinear(before, effects)):
-        return None
-    loss = squared(fits, fitted, measured - exact)
+    before, target = design.point, model_at(design, base, effects)
     known = {(effect.effect, effect.drive): effect for effect in before.effects} if before else {}
-    if all((effect.effect, effect.drive) in known for effect in effects) and before is not None:
+    is_around = _has_nonlinear(before, effects)
+    is_known = before is not None and all(
+        (effect.effect, effect.drive) in known for effect in effects)
+    if not (is_around or is_known):
+        return OperatingPoint(target, base, effects)  # whatever the exact forces are
+    measured, exact = fits.regression.residuals.measured, design.exact_forces(target)
+    if is_around and squared(
+            fits, fitted, exact - linear_prediction(fits, fitted)) < LEAST_DIFFERENCE:
+        return None
+    if before is not None and is_known:
+        loss = squared(fits, fitted, measured - exact)
         reached = squared(fits, fitted, measured - design.forces)
         for _ in range(MOST_HALVINGS):
             if loss < reached:

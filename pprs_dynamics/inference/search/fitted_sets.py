@@ -16,6 +16,7 @@ from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
     LOAD,
@@ -72,6 +73,16 @@ class FittedSets:
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._best: CandidateSet | None = None
         self._nuisance: dict[Hashable, Mapping[str, Block]] = {}
+
+    def around(self, point: OperatingPoint, alone: bool = False) -> FittedSets:
+        """Return sets of the same recordings around another operating point, none fitted yet.
+
+        See `Design.around`.
+        """
+        found = FittedSets(self.design.around(point, alone), self.decisions,
+                           self.regression.error_scale)
+        found.components.propose_as(self.components)
+        return found
 
     @property
     def sets(self) -> tuple[CandidateSet, ...]:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -83,6 +84,12 @@ class ScoreTest(Generic[Label]):
     def rows(self) -> Mapping[int, Array]:
         """As given."""
         return self._columns.rows
+
+    def around(self, regression: Regression) -> ScoreTest[Label]:
+        """Return the same test of the same samples around another operating point."""
+        found = copy(self)
+        found.regression, found._columns = regression, Columns(regression, self.rows)
+        return found
 
     def _group(self, entries: list[Entry[Label]]) -> _Group[Label]:
         places = np.array([entry.rows for entry in entries])

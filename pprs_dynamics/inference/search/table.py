@@ -314,8 +314,7 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
         point = best.fits.design.point
         patterns = search.patterns
         search.release()
-        fits = first if point is None else FittedSets(
-            design.around(point), decisions, first.regression.error_scale)
+        fits = first if point is None else first.around(point)
         search = Search(fits, [pattern.around(fits.regression) for pattern in patterns],
                         lambda share: report(0.6 + 0.3 * share))
         search.run(best.fitted.candidates)

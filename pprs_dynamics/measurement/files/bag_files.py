@@ -21,7 +21,6 @@ from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
     JointStateBlocks,
     message_types,
-    serialised,
 )
 from pprs_dynamics.measurement.files.merged_states import (
     CONTROLLER,
@@ -213,13 +212,15 @@ def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, sta
                   recorded: Indices) -> None:
     """Write samples as joint states, with stamps in their headers and as they are recorded."""
     connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
-    for start in range(0, len(stamps), BLOCK):
-        part = slice(start, start + BLOCK)
-        velocity = None if samples.velocity is None else samples.velocity[part]
-        rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
-                          samples.effort[part])
-        for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
-            writer.write(connection, stamp, row.tobytes())
+    types = typestore.types
+    none = np.empty((len(stamps), 0))
+    quantities = [np.ascontiguousarray(none if values is None else values, dtype=float)
+                  for values in (samples.position, samples.velocity, samples.effort)]
+    for stamp, at, *values in zip(stamps.tolist(), recorded.tolist(), *quantities, strict=True):
+        header = types['std_msgs/msg/Header'](
+            types['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9)), '')
+        message = types[JOINT_STATE](header, list(samples.drives), *values)
+        writer.write(connection, at, typestore.serialize_cdr(message, JOINT_STATE))
 
 
 def _chosen(bag: Bag, topic: str | None) -> list[Connection]:

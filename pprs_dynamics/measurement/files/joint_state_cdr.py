@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The CDR bytes of sensor_msgs/JointState, read and written many messages at a time.
+"""The CDR bytes of sensor_msgs/JointState, read many messages at a time.
 
 A topic of joint states carries the same names in the same order in every message, so its bytes
 have one layout: length words and names that never change, and numbers at fixed places. Reading
@@ -101,56 +101,6 @@ class Layout:
         return self.names, stamps, [
             np.ascontiguousarray(rows[:, offset:offset + 8 * count]).view('<f8').astype(
                 np.float64, copy=False) for offset, count in self.arrays]
-
-    def filled(self, stamps: Indices, *quantities: Array | None) -> NDArray[np.uint8]:
-        """Return messages with this layout as rows of bytes, (N, length), all else zero.
-
-        Parameters
-        ----------
-        stamps : (N,) array of int
-            [ns].
-        *quantities : (N, count) arrays
-            Position, velocity and effort; what has no values is not looked at.
-        """
-        rows = np.zeros((len(stamps), self.length), np.uint8)
-        rows[:, self.fixed] = self.pattern
-        seconds, nanoseconds = np.divmod(stamps, 10**9)
-        words = np.column_stack((seconds, nanoseconds)).astype('<u4')
-        rows[:, HEADER:HEADER + STAMP.size] = words.view(np.uint8)
-        for (offset, count), values in zip(self.arrays, quantities, strict=True):
-            if count:
-                numbers = np.ascontiguousarray(values, dtype='<f8')
-                rows[:, offset:offset + 8 * count] = numbers.view(np.uint8)
-        return rows
-
-
-def serialised(
-    names: tuple[str, ...], stamps: Indices, position: Array, velocity: Array | None,
-    effort: Array,
-) -> NDArray[np.uint8]:
-    """Return JointState messages with an empty frame as rows of bytes, (N, length).
-
-    Parameters
-    ----------
-    names : tuple of D str
-    stamps : (N,) array of int
-        [ns].
-    position, velocity, effort : (N, D) arrays
-        `velocity` may be None: an empty sequence.
-    """
-    return _layout_of(names, velocity is not None).filled(stamps, position, velocity, effort)
-
-
-@cache
-def _layout_of(names: tuple[str, ...], has_velocity: bool) -> Layout:
-    store, zeros = message_types(), np.zeros(len(names))
-    header = store.types['std_msgs/msg/Header'](
-        store.types['builtin_interfaces/msg/Time'](0, 0), '')
-    message = store.types[JOINT_STATE](
-        header, list(names), zeros, zeros if has_velocity else zeros[:0], zeros)
-    layout = Layout.of(bytes(store.serialize_cdr(message, JOINT_STATE)))
-    assert layout is not None
-    return layout
 
 
 class JointStateBlocks:

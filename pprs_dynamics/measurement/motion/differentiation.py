@@ -93,11 +93,8 @@ class LocalPolynomial:
 
     def filtered(self, values: Array, derivative: int) -> Array:
         """Return a derivative (0, 1, 2) of values (N, D), without the edges: (N - 2 half, D)."""
-        weights = self.coefficients[derivative][::-1]
         middle = values[len(values) // 2]  # large constants would cost digits
-        result = np.empty((len(values) - 2 * self.half, values.shape[1]))
-        for drive in range(values.shape[1]):
-            result[:, drive] = convolve_valid(values[:, drive] - middle[drive], weights)
+        result = filtered(values - middle, self.coefficients[derivative])
         return result + middle if derivative == 0 else result
 
     def differentiated(self, values: Array) -> tuple[Array, Array, Array]:
@@ -256,9 +253,9 @@ def _acceleration_error(stretches: Sequence[Stretch], duration: float, noise: Ar
         narrow = LocalPolynomial(
             max(ORDER + 2, _odd(REFERENCE_RATIO * wide.window)), step)
         trim = wide.half - narrow.half
-        padded = np.pad(narrow.coefficients[2], trim)
-        gap = wide.filtered(q, 2) - narrow.filtered(q, 2)[trim:-trim]
-        gain = float(np.sum((wide.coefficients[2] - padded) ** 2))
+        difference = wide.coefficients[2] - np.pad(narrow.coefficients[2], trim)
+        gap = filtered(q - q[len(q) // 2], difference)  # large constants would cost digits
+        gain = float(np.sum(difference ** 2))
         distortion = np.maximum(np.mean(gap * gap, axis=0) - gain * noise ** 2, 0.0)
         squares += len(gap) * (distortion + (noise * wide.noise_gain(2)) ** 2)
         count += len(gap)
@@ -292,6 +289,11 @@ def _windows(longest: int) -> list[int]:
 def _odd(samples: float) -> int:
     """Return the nearest odd number."""
     return 2 * round((samples - 1) / 2) + 1
+
+
+def filtered(values: Array, weights: Array) -> Array:
+    """Return sums of values (N, D) times weights (n,) around each sample, (N - n + 1, D)."""
+    return np.stack([convolve_valid(column, weights[::-1]) for column in values.T], axis=1)
 
 
 def convolve_valid(values: Array, weights: Array) -> Array:

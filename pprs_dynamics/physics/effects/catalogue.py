@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects import laws
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -121,6 +121,14 @@ CATALOGUE = {name: effect for name, effect in EFFECTS.items() if name != 'measur
 def find_effect(name: str) -> type[CatalogueEffect] | None:
     """Return the effect of that name, or None; other packages are asked only where need be."""
     return EFFECTS.get(name) or catalogue().get(name)
+
+
+def find_parameter(key: str) -> Parameter | None:
+    """Return the parameter of a key EFFECT.PARAMETER or EFFECT.DRIVE.PARAMETER, or None."""
+    name, _, rest = key.partition('.')
+    effect = find_effect(name) if rest else None
+    return None if effect is None else next(
+        (p for p in effect.parameters if p.name == rest.rpartition('.')[2]), None)
 
 
 @cache

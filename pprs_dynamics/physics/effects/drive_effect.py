@@ -157,9 +157,15 @@ class DriveEffect(CatalogueEffect):
 
     Its force is linear in the coefficients: the sum of coefficient times column. What is not
     linear (`shape`) enters the columns.
+
+    Class attributes
+    ----------------
+    is_smooth : bool
+        True where columns at mean positions are nearly the means of columns.
     """
 
     acts_in = frozenset({PLATFORM, SLIDE, MECHANISM})
+    is_smooth: ClassVar[bool] = False
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -201,9 +207,12 @@ class DriveEffect(CatalogueEffect):
                  shapes: Sequence[Mapping[str, float]]) -> Array | None:
         """Return columns of `scanned` for many shapes from means over `period`, (S, k, N).
 
-        None where columns of means do not give means of columns: then every sample is used.
+        Those of the means where the effect `is_smooth`, else None: then every sample is used.
         """
-        return None
+        if not cls.is_smooth:
+            return None
+        scanned = [coefficient.name in cls.scanned for coefficient in cls.coefficients]
+        return np.stack([np.stack(cls.columns(drive, **shape))[scanned] for shape in shapes])
 
     @classmethod
     def drive_memory(cls) -> Any:
@@ -254,7 +263,7 @@ class DriveEffect(CatalogueEffect):
 
     @classmethod
     def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
-                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
         """Return the checked parameters of each drive from `{'drive.parameter': value}`."""
         prefix = f'effects.{cls.name}'
         blocks: dict[str, dict[str, Any]] = {}
@@ -264,8 +273,7 @@ class DriveEffect(CatalogueEffect):
         if not blocks or '' in blocks:
             raise ModelError(prefix, dict(values), 'map drives to parameters, e.g. lift_1: '
                              f'{{{names(cls.parameters)}}}')
-        return {drive: cls._checked(f'{prefix}.{drive}', block, is_complete,
-                                    None if turning is None else drive in turning)
+        return {drive: cls._checked(f'{prefix}.{drive}', block, is_complete, drive in turning)
                 for drive, block in blocks.items()}
 
 

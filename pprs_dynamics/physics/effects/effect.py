@@ -39,6 +39,8 @@ class Parameter:
     expected : (float, float), optional
         How large it usually is, as a standard deviation, in a drive that pushes and in one that
         turns, the same in the structure; without it any size is as likely as another.
+    product : Product, optional
+        What is fitted in its place where efforts are not linear in it.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Parameter:
     is_angle: bool = False
     expected: tuple[float, float] | None = None
     turning: tuple[float, float] | None = None
+    product: Product | None = None
 
     def of(self, turns: bool) -> Parameter:
         """Return the parameter with the bounds that it has in a drive that turns, or pushes."""
@@ -93,6 +96,36 @@ class Parameter:
         return float(value)
 
 
+class Product(NamedTuple):
+    """A coefficient that is sign * factor * (parameter - origin), in which efforts are linear.
+
+    Parameters
+    ----------
+    coefficient : Parameter
+    factor : str
+        Name of a parameter that is its own coefficient, e.g. a mass.
+    origin, sign : float
+    farthest : float
+        Largest parameter. A factor that is too small for it becomes the smallest that is not.
+    """
+
+    coefficient: Parameter
+    factor: str
+    origin: float = 0.0
+    sign: float = 1.0
+    farthest: float = math.inf
+
+    def value(self, factor: float, parameter: float) -> float:
+        """Return the coefficient."""
+        return 0.0 + self.sign * factor * (parameter - self.origin)
+
+    def solved(self, factor: float, value: float) -> tuple[float, float]:
+        """Return the factor and the parameter that make a coefficient of this value."""
+        factor = math.copysign(max(abs(factor), abs(value) / self.farthest), factor)
+        away = 0.0 + self.sign * value / factor if factor else 0.0
+        return factor, self.origin + max(-self.farthest, min(self.farthest, away))
+
+
 class Effect(ABC):
     """A share of the drive forces. Positive is what the drive must apply more.
 
@@ -124,6 +157,11 @@ class Effect(ABC):
         memory : object, optional
             What `initial_memory` returned, advanced in place to the last sample.
         """
+
+    def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
+        """Return the measured effort where the drives apply `effort`, (N, D), if it is a sensor's.
+        """
+        return effort + self.force(state, memory)
 
     def initial_memory(self, start: float | None = None) -> Any:
         """Return a fresh memory, or None for an effect without one.
@@ -190,8 +228,19 @@ class Wave(NamedTuple):
 
     amplitude: str
     phase: str
-    sine: str
-    cosine: str
+    sine: str = 'sine'
+    cosine: str = 'cosine'
+
+    def coefficients(self, linear: Mapping[str, Parameter]) -> tuple[Parameter, Parameter]:
+        """Return the coefficients, in the unit and with the size of the amplitude."""
+        amplitude, phase = linear[self.amplitude], linear[self.phase]
+        turning = amplitude.turning and (-amplitude.turning[1], amplitude.turning[1])
+        sine, cosine = (replace(
+            amplitude, name=name, symbol=f'{amplitude.symbol} {function} {phase.symbol}',
+            description=f'amplitude of the {name.replace("_", " ")}', lower=-amplitude.upper,
+            default=None, turning=turning)
+            for name, function in ((self.sine, 'cos'), (self.cosine, 'sin')))
+        return sine, cosine
 
 
 class EffectType(ABCMeta):
@@ -227,6 +276,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     parameters : tuple of Parameter
         Both.
     coefficients : tuple of Parameter
+        By default the linear parameters, or what is fitted in place of them: products, and of
+        waves sine and cosine.
     variants : tuple of tuple of str
         Sets of coefficients that are tried, the others being zero; by default all at once.
     scanned : tuple of str
@@ -292,7 +343,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         if hasattr(cls, 'linear'):
             cls.parameters = cls.linear + cls.shape
             if 'coefficients' not in vars(cls):
-                cls.coefficients = cls.linear
+                linear = {parameter.name: parameter for parameter in cls.linear}
+                in_waves = {name for wave in cls.waves for name in wave[:2]}
+                cls.coefficients = (
+                    *(p.product.coefficient if p.product else p
+                      for name, p in linear.items() if name not in in_waves),
+                    *(each for wave in cls.waves for each in wave.coefficients(linear)))
             if 'variants' not in vars(cls):
                 cls.variants = (tuple(c.name for c in cls.coefficients),)
             if 'scanned' not in vars(cls):
@@ -350,7 +406,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @classmethod
     @abstractmethod
     def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
-                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
         """Return the argument of the class from keys of a model file, or raise ModelError.
 
         Parameters
@@ -360,12 +416,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         is_complete : bool
             False where values may be missing: a node gets them one by one before the effect is
             active.
-        turning : collection of str, optional
-            Drives that turn; None allows the bounds of either kind.
+        turning : collection of str
+            Drives that turn.
         """
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], turning: Collection[str] | None = None) -> Self:
+    def from_file(cls, values: Mapping[str, Any], turning: Collection[str] = ()) -> Self:
         """Return the effect with values of a model file; see `checked`."""
         build: Any = cls
         effect: Self = build(cls.checked(values, turning=turning))
@@ -378,6 +434,10 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         for amplitude, phase, sine, cosine in cls.waves:
             given[sine] = values[amplitude] * math.cos(values[phase])
             given[cosine] = values[amplitude] * math.sin(values[phase])
+        for p in cls.linear:
+            if p.product is not None:
+                given[p.product.coefficient.name] = p.product.value(
+                    values.get(p.product.factor, 0.0), values.get(p.name, p.product.origin))
         return {c.name: given[c.name] if c.default is None else given.get(c.name, c.default)
                 for c in cls.coefficients}
 
@@ -388,6 +448,10 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         for amplitude, phase, sine, cosine in cls.waves:
             a, b = found.pop(sine), found.pop(cosine)
             found[amplitude], found[phase] = math.hypot(a, b), math.atan2(b, a)
+        for p in cls.linear:
+            if p.product is not None:
+                found[p.product.factor], found[p.name] = p.product.solved(
+                    found[p.product.factor], found.pop(p.product.coefficient.name))
         return found
 
     @classmethod
@@ -397,7 +461,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
-                 turns: bool | None = None) -> dict[str, Any]:
+                 turns: bool = False) -> dict[str, Any]:
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
@@ -411,8 +475,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             value = values.get(name, parameter.default)
-            bounded = parameter.widest if turns is None else parameter.of(turns)
-            checked[name] = bounded.check(f'{prefix}.{name}', value)
+            checked[name] = parameter.of(turns).check(f'{prefix}.{name}', value)
         return checked
 
 

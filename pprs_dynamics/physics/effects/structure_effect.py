@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 from math import inf
 from typing import Any, ClassVar, Self
@@ -14,12 +13,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter, Product
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, StructureLoad
 
-# Linear parameters, coefficients and variants of an effect at one place.
-OfPlace = tuple[tuple[Parameter, ...], tuple[Parameter, ...], Sequence[tuple[str, ...]]]
+# Linear parameters and variants of an effect at one place.
+OfPlace = tuple[tuple[Parameter, ...], Sequence[tuple[str, ...]]]
 
 
 class StructureEffect(CatalogueEffect):
@@ -55,16 +54,15 @@ class StructureEffect(CatalogueEffect):
         """
         stand_ins = {name for group in alike for name in group[1:]}
         each = [cls.of_place(place, place[0] in stand_ins, moved) for place in places]
-        linear, coefficients, variants = (
-            tuple(one for parameters in each for one in parameters[k]) for k in range(3))
         return type(cls.__name__, (cls,), {
-            'places': places, 'linear': linear, 'coefficients': coefficients,
-            'variants': variants, 'alike': alike, '__module__': cls.__module__,
+            'places': places, 'linear': tuple(p for linear, _ in each for p in linear),
+            'variants': tuple(names for _, variants in each for names in variants),
+            'alike': alike, '__module__': cls.__module__,
             'made_by': (cls.at_places, (places, alike, moved))})
 
     @classmethod
     def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
-        """Return linear parameters, coefficients and variants at a place; see `at_places`.
+        """Return linear parameters and variants at a place; see `at_places`.
 
         Parameters
         ----------
@@ -74,11 +72,11 @@ class StructureEffect(CatalogueEffect):
         moved : float
             [kg]
         """
-        return (), (), ()
+        return (), ()
 
     @classmethod
     def checked(cls, values: Mapping[str, Any], is_complete: bool = True,
-                turning: Collection[str] | None = None) -> Mapping[str, Any]:
+                turning: Collection[str] = ()) -> Mapping[str, Any]:
         """Return the checked values by name of the parameter."""
         return cls._checked(f'effects.{cls.name}', values, is_complete)
 
@@ -141,31 +139,26 @@ LARGEST = 1e3  # [kg]
 
 
 def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
-                    ) -> tuple[Parameter, ...]:
-    """Return the parameters of a body on a link of some mass; `prefix` is before their names."""
-    return (
-        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
-                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST,
-                  0.0 if prefix else None, scale=0.1),
-        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
-                    -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
-        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
-                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
-          for axes in (*MOMENTS, *PRODUCTS)))
+                    moved: float = inf) -> tuple[Parameter, ...]:
+    """Return the parameters of a body on a link of some mass; `prefix` is before their names.
 
-
-def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, ...]:
-    """Return what efforts are linear in: the first moment instead of the centre.
-
+    Efforts are linear in the first moment about the link's centre, not in the body's place.
     `moved` is the mass of all that the mechanism moves, as which a body is usually no heavier:
     on a link that turns about a fixed axis a recording decides the first moment, not the mass.
     """
-    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
-    moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
-                         f'mass times its place along {axis} of {link}',
-                         -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
-    return (replace(mass, expected=(moved, moved) if 0 < moved < inf else None), *moments,
-            *rest[3:])
+    return (
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
+                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST, 0.0 if prefix else None, scale=0.1,
+                  expected=(moved, moved) if 0 < moved < inf else None),
+        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
+                    -1e2, 1e2, at, scale=0.05, product=Product(
+                        Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+                                  f'mass times its place along {axis} of {link}', -1e3, 1e3, 0.0,
+                                  scale=0.05), f'{prefix}mass', at))
+          for axis, at in zip(AXES, centre, strict=True)),
+        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
+                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
+          for axes in (*MOMENTS, *PRODUCTS)))
 
 
 class AddedBody(BodyEffect):
@@ -188,7 +181,7 @@ class AddedBody(BodyEffect):
 
     @classmethod
     def of_place(cls, place: BodyPlace, is_alike: bool, moved: float) -> OfPlace:
-        """Return the parameters, coefficients and variants of a body on a link.
+        """Return the parameters and variants of a body on a link.
 
         Of links that are alike the first represents all, with a body anywhere. With a mass more
         at its own centre each of them is a hypothesis of its own.
@@ -201,33 +194,7 @@ class AddedBody(BodyEffect):
             variants.append((mass, *moment))
         if not (prefix or is_spread):
             variants += [(mass, *moment, *MOMENTS), (mass, *moment, *MOMENTS, *PRODUCTS)]
-        return (body_parameters(prefix, link, centre, weight)[:count],
-                body_coefficients(prefix, link, moved)[:count], variants)
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the coefficients that belong to parameters."""
-        if not cls.places:
-            return super().to_coefficients(values)
-        found = cls._shared(values)
-        for prefix, centre in cls._bodies():
-            for axis, at in zip(AXES, centre, strict=True):
-                away = values.get(f'{prefix}{axis}', at) - at
-                found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
-        return found
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return the linear parameters that belong to coefficients."""
-        if not cls.places:
-            return super().from_coefficients(coefficients)
-        found = cls._shared(coefficients)
-        for prefix, centre in cls._bodies():
-            mass = found[f'{prefix}mass']
-            for axis, at in zip(AXES, centre, strict=True):
-                moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
-                found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
-        return found
+        return body_parameters(prefix, link, centre, weight, moved)[:count], variants
 
     @classmethod
     def moments_about_links(cls) -> dict[str, dict[str, float]]:
@@ -238,13 +205,6 @@ class AddedBody(BodyEffect):
         return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
                 for prefix, centre in cls._bodies()
                 for axis, at in zip(AXES, centre, strict=True)}
-
-    @classmethod
-    def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return masses and inertias, which are parameters and coefficients alike."""
-        return {name: values.get(name, 0.0) for place in cls.places
-                for name in (f'{cls.prefix_of(place)}{last}' for last in (
-                    ('mass',) if place.is_spread else ('mass', *MOMENTS, *PRODUCTS)))}
 
     @classmethod
     def prefix_of(cls, place: BodyPlace) -> str:

@@ -172,7 +172,7 @@ class _Reader:
     def _body(self, b: int, links: dict[str, Array], joints: dict[str, Joint]) -> None:
         model = self.model
         parent = self.bodies[int(model.body_parentid[b])]
-        at = Frame(_matrix(model.body_quat[b]), model.body_pos[b].copy())
+        at = Frame(matrix_of(model.body_quat[b]), model.body_pos[b].copy())
         first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
         name = self.bodies[b]
         links[name] = self._inertial(b)
@@ -261,7 +261,7 @@ class _Reader:
 
     def _inertial(self, b: int) -> Array:
         model = self.model
-        R = _matrix(model.body_iquat[b])
+        R = matrix_of(model.body_iquat[b])
         return body_at(float(model.body_mass[b]), tuple(model.body_ipos[b]),
                        R @ np.diag(model.body_inertia[b]) @ R.T)
 
@@ -287,7 +287,7 @@ class _Reader:
             if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 raise ModelError('robot.mjcf', name, 'be a connect, weld or joint constraint')
             if model.eq_objtype[e] == self.mujoco.mjtObj.mjOBJ_SITE:
-                frames = [Frame(_matrix(model.site_quat[s]), model.site_pos[s].copy())
+                frames = [Frame(matrix_of(model.site_quat[s]), model.site_pos[s].copy())
                           for s in (a, b)]
                 a, b = (int(model.site_bodyid[s]) for s in (a, b))
             elif kind == kinds.mjEQ_CONNECT:
@@ -295,7 +295,7 @@ class _Reader:
                           Frame(np.eye(3), numbers[3:6].copy())]
             else:
                 # A point and the attitude of the second body in the first, and that point in it.
-                frames = [Frame(_matrix(numbers[6:10]), numbers[3:6].copy()),
+                frames = [Frame(matrix_of(numbers[6:10]), numbers[3:6].copy()),
                           Frame(p=numbers[:3].copy())]
             loops.append(Loop(name, 'spherical' if kind == kinds.mjEQ_CONNECT else 'fixed',
                               self.bodies[a], frames[0], self.bodies[b], frames[1]))
@@ -316,7 +316,7 @@ class _Reader:
                                                     y + float(numbers[0]) - ratio * x))
 
 
-def _matrix(quaternion: Array) -> Array:
+def matrix_of(quaternion: Array) -> Array:
     """Return the rotation of a quaternion w, x, y, z."""
     w, x, y, z = quaternion
     return rotation_matrix(x, y, z, w)

@@ -139,6 +139,12 @@ class PlatformMotion:
         """Return the motion with measured channels of the drives, (N, 6) each."""
         return PlatformMotion._of(self.rows, self.time, channels)
 
+    def accelerated(self, change: Array) -> PlatformMotion:
+        """Return the motion with other linear and angular accelerations, by (N, 6)."""
+        rows = self.rows.copy()
+        rows[:, 13:] += change
+        return PlatformMotion._of(rows, self.time, self.channels)
+
     def resampled(self, rate: float) -> PlatformMotion:
         """Return the motion at a constant rate.
 

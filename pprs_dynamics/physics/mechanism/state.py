@@ -17,7 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED, JointFriction
+from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.system.parallel import lazy
 
@@ -129,7 +129,7 @@ class MechanismState(JointMotion):
     load : StructureLoad, optional
     known : LinkMotion or ClosedForm, optional
         The kinematics, where they are known.
-    friction : JointFriction
+    friction : JointFriction or Joints
         The model's own, which is computed together with the efforts.
     start, nearby : (N, C) and (C,) arrays, optional
         See `Evaluation.forward_kinematics`.
@@ -141,7 +141,7 @@ class MechanismState(JointMotion):
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Any = field(default=None, kw_only=True)
-    friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
+    friction: Any = field(default=NO_FRICTION, kw_only=True)
     start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
     motion: Any = field(default=None, kw_only=True)

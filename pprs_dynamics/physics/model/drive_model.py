@@ -34,29 +34,15 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
     ModelJointFriction,
 )
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    ARMATURE,
-    COEFFICIENT,
-    COULOMB,
-    DRIVE_FRICTION,
-    JOINT_EFFORT,
-    OF_DRIVE,
-    OFFSET,
-    RIGID,
-    TOTAL,
-    VISCOUS,
-    WIDTH,
-)
-from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
+from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
     FILES,
     GAIN,
-    ROBOT,
     Key,
     is_described,
     keys_of,
@@ -182,11 +168,6 @@ class DriveModel:
         return keys_of(self.values)
 
     @property
-    def block(self) -> str:
-        """Block of its file that describes the robot; '' for that of the paper."""
-        return ROBOT if is_described(self.values) else ''
-
-    @property
     def is_mechanism(self) -> bool:
         """Whether it is neither a 3-PPRS nor a single slide."""
         return self.kind == MECHANISM
@@ -268,8 +249,7 @@ class DriveModel:
             self.drives, joint_names(self.values, self.drives),
             recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
             self.units, tuple(self.limits.efforts.tolist()),
-            next((EFFORT_UNITS[value] for key, value in self.values.items()
-                  if key.endswith('.effort_unit')), 1.0))
+            EFFORT_UNITS[self.values.get('robot.effort_unit', 'N m')])
 
     @cached_property
     def fingerprint(self) -> str:
@@ -356,17 +336,15 @@ class DriveModel:
         EffectError
             Where an effect of another package fails.
         """
-        if type(motion) is not self._usual_motion:
-            self._require_motion(motion)
+        self._require_motion(motion)
         found = self._one_pass(motion, None if state is None else state.closed)
         if found is None:
             # Very large numbers overflow; users of the result check that it is finite.
             with np.errstate(over='ignore', invalid='ignore'):
-                if state is None:
-                    return self.forces_at(self.mechanism(motion))
-                mechanism = self.mechanism(motion, state.closed)
+                mechanism = self.mechanism(motion, None if state is None else state.closed)
                 found = self.forces_at(mechanism, state)
-            self.robot.remember(mechanism, state.closed)
+            if state is not None:
+                self.robot.remember(mechanism, state.closed)
         elif self._added:
             return self._with_effects(self._added, found.parts, found.mechanism, state)
         elif state is not None:
@@ -374,24 +352,19 @@ class DriveModel:
         return found
 
     @cached_property
-    def _usual_motion(self) -> type | None:
-        """The kind of motion whose shape needs no check."""
-        return None if self.moves_joints else PlatformMotion
-
-    @cached_property
     def _own_parameters(self) -> Any:
         """Parameters of the pass over bodies and own friction, None where there is none.
 
         Effects that change the bodies, and the second approach to friction, Eq. (13), have none.
         """
-        drives = np.zeros((OF_DRIVE, len(self.drives)))
-        drives[ARMATURE], drives[WIDTH] = self.robot.armature, self.reversal.velocity
+        drives = np.zeros((rows.OF_DRIVE, len(self.drives)))
+        drives[rows.ARMATURE], drives[rows.WIDTH] = self.robot.armature, self.reversal.velocity
         for effect in self.effects:
             if isinstance(effect, DriveFriction):
-                drives[VISCOUS], drives[COULOMB] = effect.viscous, effect.coulomb
-                drives[COEFFICIENT] = effect.coefficient
+                drives[rows.VISCOUS], drives[rows.COULOMB] = effect.viscous, effect.coulomb
+                drives[rows.COEFFICIENT] = effect.coefficient
             elif isinstance(effect, DriveOffset):
-                drives[OFFSET] = effect.value
+                drives[rows.OFFSET] = effect.value
             elif isinstance(effect, BodyEffect | IndependentChainsFriction):
                 return None
         return self.robot.friction_parameters(self._joint_friction, drives)
@@ -406,19 +379,19 @@ class DriveModel:
         found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
                                                                     bool(self._added))
         return None if found is None else Forces(
-            found.efforts[TOTAL], lambda: self._own_parts(found.efforts),
+            found.efforts[rows.TOTAL], lambda: self._own_parts(found.efforts),
             lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),
             found.motion)
 
     def _own_parts(self, efforts: Array) -> dict[str, Array]:
         """Return the parts of efforts by name, in the order of the effects."""
-        parts = {RIGID_BODY: efforts[RIGID]}
+        parts = {RIGID_BODY: efforts[rows.RIGID]}
         for effect in self.effects:
             if isinstance(effect, DriveOffset):
-                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[TOTAL])
+                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[rows.TOTAL])
             elif isinstance(effect, OWN):
                 parts[effect.name] = efforts[
-                    DRIVE_FRICTION if isinstance(effect, DriveFriction) else JOINT_EFFORT]
+                    rows.DRIVE_FRICTION if isinstance(effect, DriveFriction) else rows.JOINT_EFFORT]
         return parts
 
     @cached_property
@@ -460,7 +433,8 @@ class DriveModel:
             for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            return Forces(total_force(tuple(parts.values())), parts, mechanism)
+            first, *others = parts.values()
+            return Forces(sum(others, first), parts, mechanism)                    # Eq. (14)
 
     def initial_state(self, start: float | None = None) -> ModelState:
         """Return a fresh state for effects with memory.
@@ -536,10 +510,7 @@ class DriveModel:
         parts, total = dict(forces.parts), forces.total
         state = self.initial_state() if state is None else state
         for effect in sensors:
-            memory = state.memories[effect.name]
-            after = (effect.measured(total, mechanism, memory)
-                     if isinstance(effect, MeasurementEffect)
-                     else total + effect.force(mechanism, memory))
+            after = effect.measured(total, mechanism, state.memories[effect.name])
             parts[effect.name], total = after - total, after
         return Forces(total, parts, mechanism)
 

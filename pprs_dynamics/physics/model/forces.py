@@ -17,14 +17,6 @@ RIGID_BODY = 'rigid_body'
 ACTIVE_FRICTION, PASSIVE_FRICTION = 'active_friction', 'passive_friction'
 
 
-def total_force(parts: tuple[Any, ...]) -> Any:
-    """Return the drive force Q^m, the sum of its parts, of numbers as of arrays."""
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part                                                   # Eq. (14)
-    return total
-
-
 class Forces:
     """Forces of N samples of D drives.
 

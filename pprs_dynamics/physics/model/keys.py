@@ -309,6 +309,21 @@ NODE_KEYS = frozenset({
 NODE_PREFIXES = ('qos_overrides.',)
 
 
+def below(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the keys and values below a prefix."""
+    return {key.removeprefix(prefix): value for key, value in values.items()
+            if key.startswith(prefix)}
+
+
+def blocks_below(values: Mapping[str, Any], prefix: str) -> dict[str, dict[str, Any]]:
+    """Return the blocks below a prefix by their names; the value of a name itself has key ''."""
+    blocks: dict[str, dict[str, Any]] = {}
+    for key, value in below(values, prefix).items():
+        name, _, rest = key.partition('.')
+        blocks.setdefault(name, {})[rest] = value
+    return blocks
+
+
 def as_list(value: Any) -> Any:
     """Return a tuple as a list, as in a file, and any other value unchanged."""
     return list(value) if isinstance(value, tuple) else value

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import ANY, Key, as_list
+from pprs_dynamics.physics.model.keys import ANY, Key, as_list, below, blocks_below
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -118,16 +118,13 @@ def read_steps(values: Mapping[str, Any]) -> list[Step]:
     ModelError
         For a ledger that holds what it must not.
     """
-    blocks: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        if key == BLOCK and value in (None, {}):
-            continue
-        block, _, rest = key.partition('.')
-        if block == BLOCK:
-            step, _, name = rest.partition('.')
-            if not _STEP.fullmatch(step) or not name:
-                raise ModelError(key, value, f'stand under {BLOCK}.step_01, step_02, …')
-            blocks.setdefault(step, {})[name] = value
+    rule = f'stand under {BLOCK}.step_01, step_02, …'
+    if values.get(BLOCK):
+        raise ModelError(BLOCK, values[BLOCK], rule)
+    blocks = blocks_below(values, f'{BLOCK}.')
+    for step, block in blocks.items():
+        if not _STEP.fullmatch(step) or '' in block:
+            raise ModelError(f'{BLOCK}.{step}', block.get('', block), rule)
     ordered = sorted(blocks, key=lambda name: int(name.removeprefix('step_')))
     for number, name in enumerate(ordered, start=1):
         if name != step_name(number):
@@ -197,8 +194,7 @@ def original_values(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
     found: dict[str, Any] = {
-        PREVIOUS: {name.removeprefix(f'{PREVIOUS}.'): value for name, value in block.items()
-                   if name.startswith(f'{PREVIOUS}.')}}
+        PREVIOUS: below(block, f'{PREVIOUS}.')}
     for entry in fields(Step):
         key = f'{prefix}.{entry.name}'
         if entry.name == PREVIOUS:

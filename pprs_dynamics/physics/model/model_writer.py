@@ -26,7 +26,7 @@ import yaml
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.effects.catalogue import find_parameter
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, Key, as_list, keys_of
 from pprs_dynamics.physics.model.ledger import BLOCK
@@ -36,8 +36,8 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
-from pprs_dynamics.physics.model.reference_keys import moved
+from pprs_dynamics.physics.model.parameter_values import LISTS, UNCERTAINTIES
+from pprs_dynamics.physics.model.reference_keys import REFERENCE
 from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.package_files import located
@@ -72,13 +72,7 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
     UnreadableFileError
         Where a file cannot be read or written.
     """
-    folder = Path(path).absolute().parent
-    for key in FILES:
-        if values.get(key):
-            # Files say where the URDF is from where they are.
-            urdf = located(values[key], Path(base or path).absolute().parent)
-            values = {**values, key: os.path.relpath(urdf, folder)}
-    values = moved(values, Path(base or path).absolute().parent, folder)
+    values = moved(values, Path(base or path).absolute().parent, Path(path).absolute().parent)
     if base is None:
         text = format_model(values, str(path))
     else:
@@ -89,6 +83,13 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
     check_size(text.encode('utf-8'), path)
     parse(text, path)
     write_text(path, text)
+
+
+def moved(values: Mapping[str, Any], before: Path, after: Path) -> dict[str, Any]:
+    """Return values whose files are named from another folder."""
+    return {key: os.path.relpath(located(value, before), after) if key in FILES and value
+            else [os.path.relpath(before / name, after) for name in value] if key == REFERENCE
+            else value for key, value in values.items()}
 
 
 def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> None:
@@ -127,7 +128,9 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
                    and not key.startswith(tuple(f'{block}.' for block in WRITTEN)))
     lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH, keys),
              *_effects_block(values), *_ledger_section(values)]
-    return _verified('\n'.join(lines) + '\n', values)
+    text = '\n'.join(lines) + '\n'
+    assert _same(parse_parameters(text), values), 'a model file must hold what was written'
+    return text
 
 
 def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
@@ -221,26 +224,17 @@ def _ledger_section(values: Mapping[str, Any]) -> list[str]:
 
 
 def _effects_block(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
-    found = {key: values[key] for key in sorted(
-        (key for key in values if key.startswith(('effects.', f'{UNCERTAINTIES}.'))),
-        key=lambda key: _rank(key, values))}
-    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
-
-
-def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return where a key of the effects stands: effects as added, drives in order.
+    """Return the blocks of effects and uncertainties, effects as added, drives in order.
 
     `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
     and a node takes no effect whose parameters it does not have.
     """
-    active, drives = values.get('effects.active') or (), values.get(
-        DRIVES_KEY, DRIVES)
-    block, name, *rest = key.split('.')
-    if block == 'effects' and not rest:
-        return (1,)
-    order = active.index(name) if name in active else len(active)
-    return (0 if block == 'effects' else 2, order,
-            list(drives).index(rest[0]) if rest[0] in drives else -1)
+    order = [*(values.get('effects.active') or ()), *values.get(DRIVES_KEY, DRIVES)]
+    keys = [key for key in values if key.startswith(('effects.', f'{UNCERTAINTIES}.'))]
+    found = {key: values[key] for key in sorted(keys, key=lambda key: (
+        key.startswith(UNCERTAINTIES), key in LISTS,
+        *(order.index(name) if name in order else len(order) for name in key.split('.')[1:3])))}
+    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
 
 
 def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
@@ -270,11 +264,9 @@ def _comment(key: str, keys: Mapping[str, Key]) -> str:
     if known is not None:
         return known.description + (f' [{known.unit}]' if known.unit else '')
     block, _, rest = key.partition('.')
-    effect = find_effect(rest.partition('.')[0]) if block == 'effects' else None
-    for parameter in effect.parameters if effect else ():
-        if rest.rpartition('.')[2] == parameter.name:
-            return f'{parameter.symbol}, {parameter.description} [{parameter.unit}]'
-    return ''
+    parameter = find_parameter(rest) if block == 'effects' else None
+    return ('' if parameter is None
+            else f'{parameter.symbol}, {parameter.description} [{parameter.unit}]')
 
 
 class _Scalars(yaml.SafeDumper):
@@ -293,12 +285,6 @@ def _value(value: Any) -> str:
     text: str = yaml.dump(as_list(value), Dumper=_Scalars, default_flow_style=True,
                           width=math.inf, allow_unicode=True)
     return text.removesuffix('\n').removesuffix('\n...')
-
-
-def _verified(text: str, values: Mapping[str, Any]) -> str:
-    found = parse_parameters(text)
-    assert _same(found, values), 'a model file must hold what was written'
-    return text
 
 
 def _same(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:

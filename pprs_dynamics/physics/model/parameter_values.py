@@ -5,21 +5,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect, find_parameter
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    ANY,
     NAMED,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
     Key,
+    below,
+    blocks_below,
     is_described,
     keys_of,
     title_of,
@@ -34,9 +37,8 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 
     A parameter for which the file has none is taken as exact.
     """
-    prefix = f'{UNCERTAINTIES}.{effect}.'
-    return {key.removeprefix(prefix): float(std) for key, std in values.items()
-            if key.startswith(prefix)}
+    return {key: float(std)
+            for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
@@ -56,34 +58,27 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
 
 
 # Keys of the block `effects` that are no effect.
-LISTS = ('effects.active', 'effects.measured')
+ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
+LISTS = (ACTIVE.name, 'effects.measured')
 
 
 def added_effects(
     parameters: Mapping[str, Any], robot: Any,
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active on a robot, all blocks checked."""
-    active = parameters.get('effects.active', [])
-    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
-        raise ModelError('effects.active', active, 'be a list of names of effects')
+    active = ACTIVE.check(parameters.get(ACTIVE.name, []))
     if len(set(active)) < len(active):
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
         if find_effect(name) is None:
             raise _unknown(name, 'effects.active')
-    blocks: dict[str, dict[str, Any]] = {}
-    for key, value in parameters.items():
-        block, _, rest = key.partition('.')
-        if block == 'effects' and key not in LISTS:
-            name, _, rest = rest.partition('.')
-            if rest:
-                blocks.setdefault(name, {})[rest] = value
-            elif value in (None, {}):
-                blocks.setdefault(name, {})
-            else:
-                raise ModelError(key, value, 'be a mapping of its parameters')
     of_sensors = _effects_of_sensors(parameters)
+    blocks = blocks_below({key: value for key, value in parameters.items() if key not in LISTS},
+                          'effects.')
     for name, values in blocks.items():
+        if values.pop('', None) not in (None, {}):
+            raise ModelError(f'effects.{name}', parameters[f'effects.{name}'],
+                             'be a mapping of its parameters')
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
@@ -136,19 +131,12 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         target = name.removeprefix('tolerances.')
         if target == name:
             continue
-        if (target not in keys or not keys[target].is_number) and _expected(target) is None:
+        parameter = find_parameter(target)
+        if not (keys[target].is_number if target in keys else parameter and parameter.expected):
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
-
-
-def _expected(target: str) -> tuple[float, float] | None:
-    """Return how large `effect.parameter` usually is, None for what has no usual size."""
-    name, _, last = target.partition('.')
-    effect = find_effect(name) if last else None
-    return next((p.expected for p in effect.parameters if p.name == last),
-                None) if effect is not None and hasattr(effect, 'parameters') else None
 
 
 @contextmanager
@@ -182,21 +170,14 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named: Iterable[str] = NAMED if is_described(parameters) else ()
-    blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
+    in_blocks = (*keys, *ADDED, *(NAMED if is_described(parameters) else ()))
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):
             continue
-        if name not in blocks:
-            raise UnknownNameError('key', name, (*keys, *NODE_KEYS, *sorted(blocks)))
-        if value not in (None, {}):  # a block that somebody left empty says nothing
+        if not any(key.startswith(f'{name}.') for key in in_blocks):
+            raise UnknownNameError('key', name, (*keys, *NODE_KEYS))
+        if value not in (None, {}):  # an empty block says nothing
             raise ModelError(name, value, 'be a mapping, of names to what they hold')
-
-
-def _prefixes(key: str) -> Iterator[str]:
-    """Yield the blocks that a key is in: a and a.b of a.b.c."""
-    parts = key.split('.')
-    yield from ('.'.join(parts[:count]) for count in range(1, len(parts)))
 
 
 def is_known(name: str) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns
 from pprs_dynamics.errors import ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import GAIN, Key
+from pprs_dynamics.physics.model.keys import GAIN, Key, below
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FRACTION, FILES = 'time', 'time_fraction', 'files.'
@@ -78,19 +78,16 @@ def effort_kind(values: Mapping[str, Any]) -> str:
 
 
 def gravity_in_efforts(values: Mapping[str, Any], key: str) -> Any:
-    """Return the gravity that the efforts of a model's drives hold [m/s^2].
+    """Return the gravity in the base that the efforts of a model's drives contain [m/s^2].
 
     Parameters
     ----------
     values : mapping
         Of all keys of a model.
     key : str
-        That of gravity: a number, or the vector in the base.
+        That of gravity.
     """
-    gravity = values[key]
-    if effort_kind(values) != WITHOUT_GRAVITY:
-        return gravity
-    return 0.0 if isinstance(gravity, float) else (0.0,) * len(gravity)
+    return (0.0,) * 3 if effort_kind(values) == WITHOUT_GRAVITY else values[key]
 
 
 def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> RecordedColumns | None:
@@ -102,46 +99,34 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
         For keys that are none, columns that are neither names nor numbers, scales and rates that
         are no numbers.
     """
-    given = {(name := key.removeprefix(COLUMNS)): _check_of(name, drives)(key, value)
-             for key, value in values.items() if key.startswith(COLUMNS)}
+    given = below(values, COLUMNS)
     if not given:
         return None
+    known = {**OF_TABLE, **{f'{drive}.{quantity}': check for drive in drives
+                            for quantity, check in OF_DRIVE.items()}}
+    for key, value in given.items():
+        drive, _, quantity = key.partition('.')
+        if quantity and drive not in (*drives, 'files'):
+            raise UnknownNameError('drive', drive, drives, f'{COLUMNS}{key}')
+        if key not in known:
+            raise UnknownNameError('key', f'{COLUMNS}{key}', [f'{COLUMNS}{name}' for name in known])
+        given[key] = known[key](f'{COLUMNS}{key}', value)
     found = {}
     for drive in drives:
-        own = _below(given, f'{drive}.')
+        own = below(given, f'{drive}.')
         position = own.get('position_scale', 1.0)
         # Degrees of a position are those of its velocity, but where that says otherwise.
         found[drive] = DriveColumns(
             {quantity: own[quantity] for quantity in QUANTITIES if quantity in own},
             own.get('effort_scale', 1.0), position, own.get('velocity_scale', position),
             own.get(OFFSET, 0.0), own.get(SIGN_BIT))
-    files = _below(given, FILES)
+    files = below(given, FILES)
     if files and 'position' not in files:
         raise ModelError(f'{COLUMNS}{FILES}position', '', 'name the file of positions')
     return RecordedColumns(
         given.get(TIME), found, given.get('time_scale'), given.get('rate'),
         given.get('decimal', '.'), files,
         {name: given[name] for name in CHANNELS if name in given}, given.get(FRACTION))
-
-
-def _below(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    return {key.removeprefix(prefix): value for key, value in given.items()
-            if key.startswith(prefix)}
-
-
-def _check_of(key: str, drives: Sequence[str]) -> Check:
-    """Return the check of a key of the block, or raise UnknownNameError."""
-    if key in OF_TABLE:
-        return OF_TABLE[key]
-    drive, _, quantity = key.partition('.')
-    if f'{drive}.' == FILES and quantity in (TIME, *QUANTITIES):
-        return _name
-    if drive not in drives:
-        raise UnknownNameError('drive', drive, (*drives, *OF_TABLE, 'files'), f'{COLUMNS}{key}')
-    if quantity not in OF_DRIVE:
-        raise UnknownNameError('key', f'{COLUMNS}{key}', [
-            f'{COLUMNS}{drive}.{name}' for name in OF_DRIVE])
-    return OF_DRIVE[quantity]
 
 
 def _column(key: str, value: Any) -> Column:
@@ -179,7 +164,8 @@ OF_TABLE: dict[str, Check] = {
     TIME: _column, FRACTION: _column, 'time_scale': _factor,
     'rate': _as(Key('', 'samples per second', 'Hz', positive=True)),
     'decimal': _as(Key('', 'mark of decimals', choices=('.', ','))),
-    **dict.fromkeys(CHANNELS, _column)}
+    **dict.fromkeys(CHANNELS, _column),
+    **{f'{FILES}{quantity}': _name for quantity in (TIME, *QUANTITIES)}}
 OF_DRIVE: dict[str, Check] = {
     **dict.fromkeys(QUANTITIES, _column), **dict.fromkeys(SCALES, _factor),
     OFFSET: _as(Key('', 'what is added to positions')), SIGN_BIT: _bit}

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,14 +37,6 @@ def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile]) ->
     new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files]}
     return {**{key: value for key, value in values.items() if key not in KEYS},
             **{key: value for key, value in new.items() if value}}
-
-
-def moved(values: Mapping[str, Any], before: Path, after: Path) -> dict[str, Any]:
-    """Return values whose reference runs are named from another folder."""
-    if not values.get(REFERENCE):
-        return dict(values)
-    return {**values, REFERENCE: [os.path.relpath(before / name, after)
-                                  for name in values[REFERENCE]]}
 
 
 def check_reference(parameters: Mapping[str, Any]) -> None:

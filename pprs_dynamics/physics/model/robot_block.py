@@ -33,7 +33,16 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, JOINTS, LOCKED, MOTORS, POSE
+from pprs_dynamics.physics.model.keys import (
+    DRIVES_KEY,
+    FILES,
+    JOINTS,
+    LOCKED,
+    MOTORS,
+    POSE,
+    below,
+    blocks_below,
+)
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs import robot as three_pprs
@@ -57,7 +66,7 @@ def read_platform(values: Mapping[str, Any],
     passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
                else ModelJointFriction(blocks))
     robot = three_pprs.ThreePprs(
-        Geometry(**_below(values, 'geometry.')), Masses(**_below(values, 'masses.')),
+        Geometry(**below(values, 'geometry.')), Masses(**below(values, 'masses.')),
         gravity_in_efforts(values, 'gravity'),
         {name: block['radius'] for name, block in blocks.items()},
         three_pprs.SingularityBounds(values['limits.rod_sine'], values['limits.condition_number'],
@@ -65,16 +74,11 @@ def read_platform(values: Mapping[str, Any],
         values['equations'] == 'printed')
     drives = DriveFriction(values['friction.drives.viscous'], 0.0,
                            values['friction.drives.coulomb'])
+    lower, upper = np.array([values[key] for key in STROKES]).T
     return (robot, (drives, passive),
             Reversal(_reversal_widths(values), values['friction.reversal_rate']),
-            platform_limits(values))
-
-
-def platform_limits(values: Mapping[str, Any]) -> DriveLimits:
-    """Return the strokes and efforts in the values of a 3-PPRS."""
-    lower, upper = np.array([values[key] for key in STROKES]).T
-    return DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
-                       np.array(values['limits.effort']), STROKES, 'limits.effort')
+            DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
+                        np.array(values['limits.effort']), STROKES, 'limits.effort'))
 
 
 def _reversal_widths(values: Mapping[str, Any]) -> tuple[float, ...]:
@@ -101,19 +105,14 @@ def read_mechanism(values: dict[str, Any], folder: Path,
     structure = read_structure(values, folder)
     values.update(described_values(structure, values))
     robot = _with_bodies(structure, values)
+    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
     return (robot, (DriveFriction(values['friction.viscous'], values['friction.coulomb']),
                     DriveOffset(values['friction.offset']), *passive_friction(structure, values)),
             Reversal(_reversal_widths(values), values['friction.reversal_rate'],
                      values['friction.reversal_slide']),
-            joint_limits(structure))
-
-
-def joint_limits(structure: Structure) -> DriveLimits:
-    """Return the ranges and efforts that a description has; infinite where it has none."""
-    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
-    return DriveLimits(
-        structure.drives, units, structure.lower, structure.upper, structure.effort,
-        ('its range in the URDF',) * len(units), 'the effort limit of URDF or node')
+            DriveLimits(structure.drives, units, structure.lower, structure.upper,
+                        structure.effort, ('its range in the URDF',) * len(units),
+                        'the effort limit of URDF or node'))
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:
@@ -147,7 +146,7 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
 @lru_cache(maxsize=64)
 def _structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
                own: tuple[tuple[str, Any], ...]) -> Structure:
-    home, poses = _below(dict(own), 'robot.home.'), {}
+    home, poses = below(dict(own), 'robot.home.'), {}
     for name in [name for name in home if name.endswith(POSE)]:
         pose, link = home.pop(name), name.removesuffix(POSE)
         if not np.linalg.norm(pose[3:]) > 0:
@@ -155,7 +154,7 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
         if link not in description.links:
             raise UnknownNameError('link', link, description.links, 'robot.home')
         poses[link] = pose_frame(pose)
-    loops = _blocks_below(dict(own), 'robot.loops.')
+    loops = blocks_below(dict(own), 'robot.loops.')
     for loop in description.loops:
         if loop.name in loops:
             raise ModelError(f'robot.loops.{loop.name}', loop.kind, 'not stand in the file as '
@@ -164,28 +163,13 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
         name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
         one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
     return build_structure(description, base, tool, drives, closures, home, poses,
-                           _below(dict(own), LOCKED))
-
-
-def _below(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Return the keys and values below a prefix."""
-    return {key.removeprefix(prefix): value for key, value in values.items()
-            if key.startswith(prefix)}
-
-
-def _blocks_below(values: Mapping[str, Any], prefix: str) -> dict[str, dict[str, Any]]:
-    """Return the blocks below a prefix by the names that a file gives them."""
-    blocks: dict[str, dict[str, Any]] = {}
-    for key, value in _below(values, prefix).items():
-        name, _, rest = key.partition('.')
-        blocks.setdefault(name, {})[rest] = value
-    return blocks
+                           below(dict(own), LOCKED))
 
 
 def _require_motors(description: Description, values: Mapping[str, Any]) -> None:
     """Raise ModelError where joints share a transmission, and the file does not say how."""
     drives = set(values[DRIVES_KEY])
-    mapped = {joint for turns in _blocks_below(values, MOTORS).values() for joint in turns}
+    mapped = {joint for turns in blocks_below(values, MOTORS).values() for joint in turns}
     for each in coupled(description):
         shared = [name for name in each.joints if name in drives]
         if set(shared) - mapped:
@@ -258,7 +242,7 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
     ModelError
         For a joint that is no drive, and a motor that moves fewer than two.
     """
-    rows = _blocks_below(values, MOTORS)
+    rows = blocks_below(values, MOTORS)
     for motor, ratios in rows.items():
         for joint in ratios:
             if joint not in structure.drives:
@@ -273,7 +257,7 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
 def passive_friction(structure: Structure, values: Mapping[str, Any],
                      ) -> Iterator[ModelJointFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
-    blocks, rows = _blocks_below(values, JOINTS), structure.friction_rows
+    blocks, rows = blocks_below(values, JOINTS), structure.friction_rows
     for name in blocks:
         if name not in rows:
             raise UnknownNameError('joint', name, rows, 'friction.joints')
@@ -314,7 +298,7 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
                       gravity_in_efforts(values, 'robot.gravity'),
                       {name: block['radius'] for name, block in
-                       _blocks_below(values, JOINTS).items() if block['radius']},
+                       blocks_below(values, JOINTS).items() if block['radius']},
                       motor_map(structure, values))
     _require_driven_bodies(robot)
     return robot

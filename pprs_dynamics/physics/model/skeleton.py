@@ -52,17 +52,16 @@ class Skeleton:
     lines : tuple of Line
     face : tuple of int
         Corners of the platform, or of whatever carries the load; empty where there are none.
-    joints, loops : dict of str to int
-        Points by the names of joints and of closures.
+    joints : dict of str to int
+        Points by the names of joints.
     labels : dict of str to int
-        Where names stand.
+        Points at which the names of drives are written.
     """
 
     points: Array
     lines: tuple[Line, ...]
     face: tuple[int, ...]
     joints: dict[str, int]
-    loops: dict[str, int]
     labels: dict[str, int]
 
     @classmethod
@@ -107,9 +106,7 @@ def _of_links(links: LinkMotion) -> Skeleton:
         for end in (*on_tool, len(points) - 1):
             join(tool, end, -1, s.tool)
         on_tool = []
-    joints = dict(s.rows)
-    return Skeleton(np.stack(points, axis=1), tuple(lines), _around(points, on_tool), joints,
-                    {loop.name: count + k for k, loop in enumerate(s.loops)},
+    return Skeleton(np.stack(points, axis=1), tuple(lines), _around(points, on_tool), dict(s.rows),
                     {name: s.rows[name] for name in s.drives})
 
 

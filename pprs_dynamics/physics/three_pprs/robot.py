@@ -103,7 +103,7 @@ class ClosedForm:
     def __init__(self, robot: ThreePprs, motion: PlatformMotion,
                  load: StructureLoad | None = None, joints: Joints = FRICTIONLESS_JOINTS,
                  table: Array | None = None) -> None:
-        self.robot, self.motion, self.load = robot, motion, load
+        self.robot, self.motion, self.load, self.joints = robot, motion, load, joints
         self.is_regular = True
         if table is None:
             loads = closed_form.NO_LOAD
@@ -157,7 +157,8 @@ class ClosedForm:
         return found
 
     def _with(self, joints: Joints) -> ClosedForm:
-        return ClosedForm(self.robot, self.motion, self.load, joints)
+        return self if joints == self.joints else ClosedForm(
+            self.robot, self.motion, self.load, joints)
 
     def require_regular(self) -> None:
         """Raise an error for poses out of reach, or nearer to a singularity than allowed.
@@ -209,9 +210,7 @@ def condition_number(geometry: Geometry, J: Array) -> Array:
     J. Angeles, Fundamentals of Robotic Mechanical Systems, on the characteristic length.
     """
     r = geometry.platform_radius
-    singular = np.linalg.svd(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None], compute_uv=False)
-    with np.errstate(divide='ignore'):
-        number: Array = singular[:, 0] / singular[:, -1]
+    number: Array = np.linalg.cond(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None])
     return number
 
 
@@ -400,9 +399,9 @@ class ThreePprs:
         """Return the platform at rest at its home pose."""
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
-    def state(self, motion: PlatformMotion, reversal: Reversal, friction: object = None,
-              closed: object = None, found: InverseDynamicsResult | None = None,
-              ) -> MechanismState:
+    def state(self, motion: PlatformMotion, reversal: Reversal,
+              friction: Joints = FRICTIONLESS_JOINTS, closed: object = None,
+              found: InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a platform motion; `found` as of `one_pass`.
 
         Raises
@@ -416,25 +415,25 @@ class ThreePprs:
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             table = None if found is None or len(found.efforts) < closed_form.EVERYTHING else (
                 found.efforts)
-            links = ClosedForm(self, motion, table=table)
+            links = ClosedForm(self, motion, joints=friction, table=table)
             if not links.is_regular:
                 links.require_regular()
         return MechanismState(links.position, links.velocity, links.acceleration, motion.time,
                               channels=motion.channels, robot=self, reversal=reversal,
-                              known=links, motion=motion)
+                              known=links, motion=motion, friction=friction)
 
     def remember(self, state: MechanismState, closed: object) -> None:
         """Store nothing: poses have a closed form."""
 
     def kinematics(self, state: MechanismState) -> ClosedForm:
         """Return the kinematics of a state that lacks them."""
-        return ClosedForm(self, state.motion)
+        return ClosedForm(self, state.motion, joints=state.friction)
 
     def loads(self, found: ClosedForm, load: StructureLoad | None) -> ClosedForm:
         """Return frictionless drive forces and reactions."""
         if load is found.load and self is found.robot:
             return found
-        return ClosedForm(self, found.motion, load)
+        return ClosedForm(self, found.motion, load, found.joints)
 
     def inverse_dynamics(self, state: MechanismState) -> None:
         """Return None: the model evaluates its one pass itself."""
@@ -446,10 +445,16 @@ class ThreePprs:
 
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
-        motion = self.motion_of_drives(position, state.velocity, acceleration)
-        motion = motion.with_channels(state.channels)
-        return replace(self.state(motion if state.time is None else motion.with_time(state.time),
-                                  state.reversal), robot=state.robot, load=state.load)
+        if position is state.position:
+            motion = state.motion.accelerated(np.einsum(
+                'nij,nj->ni', state.links.J, acceleration - state.acceleration))
+        else:
+            motion = self.motion_of_drives(position, state.velocity, acceleration)
+            motion = motion.with_channels(state.channels)
+            if state.time is not None:
+                motion = motion.with_time(state.time)
+        return replace(self.state(motion, state.reversal, state.friction),
+                       robot=state.robot, load=state.load)
 
     # --- singularities ----------------------------------------------------------------------------
 

@@ -20,12 +20,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_s
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.ros.messages.conversions import (
-    NANOSECONDS,
-    PLATFORM,
-    RobotNames,
-    nanoseconds,
-)
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, RobotNames, nanoseconds
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk, aligned

@@ -22,12 +22,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
-from pprs_dynamics.ros.node.rclpy_internals import (
-    InternalsChangedError,
-    WaitSet,
-    call_if_due,
-    take,
-)
+from pprs_dynamics.ros.node.rclpy_internals import InternalsChangedError, WaitSet, call_if_due, take
 
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
 PATIENCE = 1.0  # [s] in which a node ends by itself

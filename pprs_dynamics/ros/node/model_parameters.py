@@ -15,11 +15,7 @@ from std_srvs.srv import Trigger
 
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import (
-    DRIVES_KEY,
-    NODE_KEYS,
-    NODE_PREFIXES,
-)
+from pprs_dynamics.physics.model.keys import DRIVES_KEY, NODE_KEYS, NODE_PREFIXES
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,

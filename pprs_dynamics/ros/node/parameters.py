@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.catalogue import find_parameter
 from pprs_dynamics.physics.model.keys import (
     ANY,
     DRIVES_KEY,
@@ -179,12 +179,10 @@ def _declare(node: Node, key: Key, value: Any) -> None:
 def _added_descriptor(name: str) -> ParameterDescriptor:
     """Return the description of a parameter of an effect, which no table of keys has."""
     block, _, rest = name.partition('.')
-    effect, _, place = rest.partition('.')
-    for parameter in CATALOGUE[effect].parameters if effect in CATALOGUE else ():
-        if block == 'effects' and place.rpartition('.')[2] == parameter.name:
-            return ParameterDescriptor(
-                description=f'{effect}: {parameter.description}', dynamic_typing=True)
-    return ParameterDescriptor(dynamic_typing=True)
+    parameter = find_parameter(rest) if block == 'effects' else None
+    description = (
+        '' if parameter is None else f'{rest.partition(".")[0]}: {parameter.description}')
+    return ParameterDescriptor(description=description, dynamic_typing=True)
 
 
 def refuse_unknown(node: Node) -> None:

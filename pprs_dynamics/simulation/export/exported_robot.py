@@ -30,7 +30,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import APPROACHES
+from pprs_dynamics.physics.model.keys import APPROACHES, ROBOT
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -281,7 +281,7 @@ def export_robot(expressed: Expressed) -> ExportedRobot:
     """
     model, robot = expressed.model, expressed.robot
     if model.moves_joints:
-        return described(model.block, robot, expressed.joints)
+        return described(ROBOT, robot, expressed.joints)
     return described('three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts),
                      expressed.joints)
 

@@ -1,16 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Routes of the workbench (HTTP and WebSocket): each one call of the session, and its result."""
+"""Routes of the workbench: checked requests, each one call of the session, and its answer."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, nullcontext, suppress
+import json
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import asdict
 from functools import partial
+from mimetypes import guess_type
 from pathlib import Path
+from sys import float_info
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -24,32 +28,110 @@ from starlette.routing import Route
 
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
-from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.masks import (
     drawn_samples,
     quantities,
     quantity,
     region_mask,
+    robot_motion,
     shares_in,
     span_mask,
     spans_of,
 )
-from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import units_to_dict
-from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.simulation.motion_files import write_motion
 from pprs_dynamics.system.numbers import finite
+
+LARGEST = float_info.max  # whole numbers of JSON may be larger
+
+
+class BadRequestError(PprsError, ValueError):
+    """A request that is not what the page sends."""
+
+
+class Fields(dict[str, Any]):
+    """Fields of a request. What reads one raises `BadRequestError` for any other."""
+
+    @classmethod
+    def of(cls, content: bytes) -> Fields:
+        """Return the fields of a JSON object, all numbers finite and all text Unicode."""
+        try:
+            body = json.loads(content)
+            json.dumps(body, ensure_ascii=False, allow_nan=False).encode()
+        except (ValueError, RecursionError):
+            raise BadRequestError('the body is no JSON of finite numbers and of text') from None
+        if not isinstance(body, dict):
+            raise BadRequestError('the body must be an object')
+        return cls(body)
+
+    def text(self, key: str) -> str:
+        """Return a text."""
+        value = self.get(key)
+        if not isinstance(value, str):
+            raise BadRequestError(f'{key} must be a text')
+        return value
+
+    def number(self, key: str) -> float:
+        """Return a number."""
+        return float(_is_number(self.get(key), f'{key} must be a number'))
+
+    def range(self, key: str) -> tuple[float, float]:
+        """Return two numbers."""
+        value, rule = self.get(key), f'{key} must be two numbers'
+        if not isinstance(value, list) or len(value) != 2:
+            raise BadRequestError(rule)
+        return float(_is_number(value[0], rule)), float(_is_number(value[1], rule))
+
+    def revision(self) -> int:
+        """Return the revision that a change counts on."""
+        value = _is_number(self.get('revision'), 'revision must be a whole number')
+        if value != int(value):
+            raise BadRequestError('revision must be a whole number')
+        return int(value)
+
+    def drives(self) -> list[str] | None:
+        """Return names of drives, None where none are given."""
+        value = self.get('drives')
+        if value is not None and not (isinstance(value, list) and value and all(
+                isinstance(name, str) for name in value)):
+            raise BadRequestError('drives must be a list of names')
+        return value
+
+
+def _is_number(value: Any, rule: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > LARGEST:
+        raise BadRequestError(rule)
+    return value
+
+
+def packed(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> bytes:
+    """Return the length of the header (uint32), the header, and float32 arrays; little-endian.
+
+    The header gets `arrays`: name and shape of each, in order. What is not known is NaN.
+    """
+    parts = [np.ascontiguousarray(array, dtype='<f4') for array in arrays.values()]
+    shapes = [{'name': name, 'shape': part.shape}
+              for name, part in zip(arrays, parts, strict=True)]
+    text = json.dumps({**header, 'arrays': shapes}, allow_nan=False).encode()
+    text += b' ' * (-len(text) % 4)  # so that numbers begin at a multiple of their size
+    return b''.join((len(text).to_bytes(4, 'little'), text, *(part.tobytes() for part in parts)))
+
+
+def binary(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Response:
+    """Return an answer of a header and numbers."""
+    return Response(packed(header, arrays), media_type='application/octet-stream')
+
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
 HEARTBEAT = 15.0  # [s] between signs of life
+LOOK = 0.02  # [s] between looks at whether something has changed
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
-TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
 
 # What the session is asked to do by POST, with a JSON object; all are answered by the screen.
 CHANGES: dict[str, Callable[[Session, Fields], object]] = {
@@ -71,7 +153,7 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
     """Return the application, guarded."""
     @asynccontextmanager
     async def lifespan(app: Any) -> AsyncIterator[None]:
-        hub.start(asyncio.get_running_loop())
+        hub.start()
         yield
         await run_in_threadpool(hub.stop)
 
@@ -117,11 +199,10 @@ async def page(request: Request) -> Response:
 async def asset(request: Request) -> Response:
     """Answer a file of the page; only those that are shipped are files."""
     name = request.path_params['name']
-    kind = TYPES.get(Path(name).suffix)
-    if kind is None or name not in {*assets(), *VENDORED}:
+    if name not in {*assets(), *VENDORED}:
         raise HTTPException(404)
     content = vendored(VENDORED[name]) if name in VENDORED else packaged(name)
-    return Response(content, media_type=kind)
+    return Response(content, media_type=guess_type(name)[0])
 
 
 class Api:
@@ -138,9 +219,8 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'session.json': self.session,
-                'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
-                **{work.__name__: work for work in (
+        return {'model.yaml': self.model, 'experiment.csv': self.experiment_file,
+                'live/machine': self.live_machine, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
     def changes(self) -> dict[str, Callable[[Fields], Response]]:
@@ -211,12 +291,10 @@ class Api:
 
     def experiment_file(self, query: Any) -> Response:
         """Answer the poses, or the joints' positions, of the designed motion."""
-        session = self.hub.the_session
-        found = session.jobs.experiment
+        found = self.hub.the_session.jobs.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
-        return self._download('next.csv', 'text/csv', lambda path: write_motion(
-            path, session.ticks.fits.drives, found.motion))
+        return self._download('next.csv', 'text/csv', found.save)
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""
@@ -224,15 +302,12 @@ class Api:
         return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
                               lambda path: session.export(path, with_ticked))
 
-    def session(self, query: Any) -> Response:
-        """Answer what `pprs workbench` goes on with."""
-        return self._download('session.json', 'application/json', self.hub.save)
-
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
         with TemporaryDirectory(prefix='pprs_workbench_') as folder:
             write(Path(folder) / name)
-            return attached(name, kind, (Path(folder) / name).read_bytes())
+            return Response((Path(folder) / name).read_bytes(), media_type=kind, headers={
+                'Content-Disposition': f'attachment; filename="{name}"'})
 
     def scatter(self, query: Any) -> Response:
         """Answer two quantities of a drive."""
@@ -248,7 +323,7 @@ class Api:
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
-        drawn, arrays = robot_motion(self.hub.the_session)
+        drawn, arrays = robot_motion(self.hub.the_session.ticks)
         return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
                        'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 
@@ -308,13 +383,11 @@ class Api:
     async def events(self, request: Request) -> Response:
         """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
-            queue = self.hub.subscribe()
-            try:
-                yield b'data: 0\n\n'
-                while not self.hub.is_over:
-                    with suppress(TimeoutError):
-                        await asyncio.wait_for(queue.get(), HEARTBEAT)
-                    yield b'data: %d\n\n' % self.hub.version
-            finally:
-                self.hub.unsubscribe(queue)
+            yield b'data: 0\n\n'
+            told, due = 0, 0.0
+            while not self.hub.is_over:
+                if self.hub.version != told or time.monotonic() > due:
+                    told, due = self.hub.version, time.monotonic() + HEARTBEAT
+                    yield b'data: %d\n\n' % told
+                await asyncio.sleep(LOOK)
         return StreamingResponse(lines(), media_type='text/event-stream')

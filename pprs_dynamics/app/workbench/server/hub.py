@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""State that all browsers share: the session, its worker thread, and uploads."""
+"""State that all browsers share: the session and its worker, files on offer, and uploads."""
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory, mkdtemp
@@ -18,15 +19,60 @@ from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING
 
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.fleet.recordings import ENDINGS
-from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.server.offered import Offered
+from pprs_dynamics.app.fleet.recordings import BAG, ENDINGS, recordings_in
 from pprs_dynamics.app.workbench.session import Session
-from pprs_dynamics.app.workbench.session_file import SavedSession
+from pprs_dynamics.app.workbench.ticks import SessionError
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.ros.live_joint_states import LiveNodes
+
+MOST_LISTED = 2000
+
+
+class NotOfferedError(PprsError, ValueError):
+    """A recording that is in no folder of the command line."""
+
+
+@dataclass(frozen=True)
+class Offered:
+    """Recordings to choose from.
+
+    Parameters
+    ----------
+    folders : tuple of Path
+        With all recordings in them.
+    """
+
+    folders: tuple[Path, ...] = ()
+
+    @classmethod
+    def of(cls, paths: Sequence[str]) -> Offered:
+        """Return the folders among the paths that are no recordings themselves."""
+        return cls(tuple(Path(path) for path in paths if is_folder(path)))
+
+    def files(self) -> dict[str, Path]:
+        """Return recordings by `number/path within its folder`, without links to elsewhere."""
+        found = ((f'{number}/{path.relative_to(root).as_posix()}', path)
+                 for number, root in enumerate(self.folders) for path in recordings_in(root)
+                 if path.resolve().is_relative_to(root.resolve()))
+        return dict(islice(found, MOST_LISTED))
+
+    def path(self, name: str) -> Path:
+        """Return the path of a name of `files`; NotOfferedError for any other."""
+        if (path := self.files().get(name)) is None:
+            raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
+                                  'that were given')
+        return path
+
+
+def is_folder(path: str) -> bool:
+    """Return whether a path is a folder that holds recordings, and none itself."""
+    # An empty name would be the present folder, which nobody named.
+    return bool(path) and Path(path).is_dir() and not (
+        (Path(path) / BAG).exists() or any(Path(path).glob('*.db3')))
+
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
@@ -36,7 +82,7 @@ IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
 class Hub:
-    """The session, its worker, and the subscribed browsers.
+    """The session, and its worker.
 
     Parameters
     ----------
@@ -45,13 +91,10 @@ class Hub:
     offered : Offered
         What browsers may choose from.
     live : LiveNodes, optional
-    saved : SavedSession, optional
-        What is taken over once the session has begun.
     """
 
-    def __init__(self, inputs: Inputs, offered: Offered, live: LiveNodes | None = None,
-                 saved: SavedSession | None = None) -> None:
-        self.inputs, self.offered, self.live, self.saved = inputs, offered, live, saved
+    def __init__(self, inputs: Inputs, offered: Offered, live: LiveNodes | None = None) -> None:
+        self.inputs, self.offered, self.live = inputs, offered, live
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -61,20 +104,12 @@ class Hub:
         self._uploaded, self._lock, self._opening = 0, Lock(), Lock()
         self._work = Event()
         self.is_over = False
-        self._waiting: set[asyncio.Queue[None]] = set()
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._diagnosed: object = None  # once for each model, also where it fails
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
-    def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Start the worker; changes are announced in this loop."""
-        self._loop = loop
+    def start(self) -> None:
+        """Start the worker."""
         self._worker.start()
-
-    def end(self) -> None:
-        """End what browsers listen to; to be called in the loop, before connections are closed."""
-        self.is_over = True
-        self._put()
 
     def stop(self) -> None:
         """Call all work off."""
@@ -89,33 +124,6 @@ class Hub:
             self.live.close()
         self._worker.join(10)
         self._uploads.cleanup()
-
-    # Those who listen
-
-    def subscribe(self) -> asyncio.Queue[None]:
-        """Return a queue that gets an entry after changes; to be called in the loop."""
-        queue: asyncio.Queue[None] = asyncio.Queue(1)
-        self._waiting.add(queue)
-        return queue
-
-    def unsubscribe(self, queue: asyncio.Queue[None]) -> None:
-        """Listen no more."""
-        self._waiting.discard(queue)
-
-    def notify(self) -> None:
-        """Notify all browsers of a change."""
-        with self._lock:
-            self.version += 1
-        if self._loop is not None and not self._loop.is_closed():
-            with suppress(RuntimeError):  # it closes just now
-                self._loop.call_soon_threadsafe(self._put)
-
-    def _put(self) -> None:
-        for queue in self._waiting:
-            if not queue.full():
-                queue.put_nowait(None)
-
-    # The session
 
     @property
     def the_session(self) -> Session:
@@ -172,37 +180,25 @@ class Hub:
                 self._uploaded -= 1
             raise
 
-    def save(self, path: Path) -> None:
-        """Write the session; errors as `Session.save`."""
-        session = self.the_session
-        inputs = session.ticks.inputs
-        for name in (*inputs.recordings, *inputs.validation):
-            if Path(name).is_relative_to(self._uploads.name):
-                raise SessionError(f'{Path(name).name} came from the browser and is gone with the '
-                                   'server, must be opened from a folder for the session to be '
-                                   'saved')
-        session.save(path)
-
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
         session.ticks.subscribe(self._changed)
 
+    def _notify(self) -> None:
+        """Let all browsers know of a change."""
+        with self._lock:
+            self.version += 1
+
     def _changed(self) -> None:
         self._work.set()
-        self.notify()
+        self._notify()
 
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
-        try:
-            with self._opening:  # what a browser opens meanwhile comes on top
-                if self.inputs.recordings:
-                    begun = Session.of(self.inputs)
-                    if self.saved is not None:
-                        begun.resume(self.saved)
-                    self._use(begun)
-                    self._is_unjudged = True
-        except Exception as error:
-            self._fail(error)
+        with self._opening:  # what a browser opens meanwhile comes on top
+            if self.inputs.recordings and self._done(
+                    lambda: self._use(Session.of(self.inputs))):
+                self._is_unjudged = True
         self.is_beginning = False
         self._changed()
         while not self.is_over:
@@ -213,32 +209,31 @@ class Hub:
             self._work.clear()
             time.sleep(BREATH)
             session = self.session
-            if session is None or self.is_over:
-                continue
-            if not session.ticks.view.is_settled:
-                try:
-                    session.ticks.settle()
-                    self.failure = ''
-                except Exception as error:
-                    self._fail(error)
-                    self.notify()
+            if session is not None and not self.is_over and not session.ticks.view.is_settled and (
+                    self._done(session.ticks.settle)):
+                self.failure = ''
+
+    def _done(self, work: Callable[[], object]) -> bool:
+        """Return whether work succeeds; say on the page what went wrong.
+
+        A defect of ours is logged in the terminal as well.
+        """
+        try:
+            work()
+        except Exception as error:
+            self.failure = str(error)
+            if not isinstance(error, PprsError):
+                self.failure = f'{type(error).__name__}: {error}'
+                logging.getLogger(__name__).exception('the workbench goes on')
+            self._notify()
+            return False
+        return True
 
     def _find_mistakes(self) -> None:
         """Look at units and signs of what the command line gave, once the page stands."""
         if self.session is not None and self._is_unjudged:
-            self._is_unjudged = False
-            try:
-                self.session.ticks.change_recordings(Inputs.checked)
-            except PprsError as error:
-                self.failure = str(error)
-                self.notify()
-
-    def _fail(self, error: Exception) -> None:
-        """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
-        self.failure = str(error)
-        if not isinstance(error, PprsError):
-            self.failure = f'{type(error).__name__}: {error}'
-            logging.getLogger(__name__).exception('the workbench goes on')
+            self._is_unjudged, ticks = False, self.session.ticks
+            self._done(lambda: ticks.change_recordings(Inputs.checked))
 
     def _diagnose(self) -> None:
         session = self.session

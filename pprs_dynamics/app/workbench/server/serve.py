@@ -72,7 +72,7 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
         """Server that closes the event streams of browsers at shutdown, which it would wait for."""
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-            hub.end()
+            hub.is_over = True
             await super().shutdown(sockets)
     config = uvicorn.Config(
         application(hub, keys, used), log_level='warning', access_log=False, server_header=False,

@@ -73,6 +73,7 @@ class Counterbalance(DriveEffect):
                        'in line with the axis', -100.0, 100.0, scale=0.3))
     variants = (('force', 'stiffness'), ('area',))
     scanned = ('force', 'stiffness')
+    is_smooth = True
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
@@ -89,15 +90,6 @@ class Counterbalance(DriveEffect):
         force, stiffness, measured = cls.columns(drive, **shape)
         bend = BEND * share ** 2
         return ((bend * force, bend * stiffness, np.zeros_like(measured)),)
-
-    @classmethod
-    def averaged(cls, drive: DriveSamples, period: float,
-                 shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Return columns of `scanned` at mean positions, which they change little about."""
-        ratio, place = (np.array([shape[name] for shape in shapes])[:, None]
-                        for name in ('ratio', 'position'))
-        length, lever = _length(drive.position, ratio, place)
-        return np.stack((lever / length, lever), axis=1)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:

@@ -74,7 +74,7 @@ class CoupledDrives(StructureEffect):
             Parameter(viscous, 'c', 'N m s/rad', f'viscous friction of {motor}', -1e6, 1e6, 0.0,
                       scale=0.1),
             Parameter(coulomb, 'F', 'N m', f'dry friction of {motor}', -1e6, 1e6, 0.0, scale=0.1))
-        return linear, linear, ((viscous,), (coulomb,), names)
+        return linear, ((viscous,), (coulomb,), names)
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""

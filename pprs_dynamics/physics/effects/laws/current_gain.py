@@ -57,21 +57,15 @@ class CurrentGain(MeasurementEffect):
     linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
                         'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,
-                        scale=0.02),
+                        scale=0.02, expected=(0.03, 0.03)),
               Parameter('phase', 'phi', 'rad', 'phase of the wave at position 0', -2 * math.pi,
                         2 * math.pi, 0.0, scale=0.5, is_angle=True))
     shape = (Parameter('reference', 'T_0', 'degC', 'temperature at which the constant is the '
                        "model's", -1e4, 1e4, 25.0, scale=10.0),
              Parameter('pitch', 'p', 'm', 'distance between two waves', 1e-6, 10.0,
                        scale=0.005, turning=(1e-6, 100.0), default=1.0))
-    coefficients = (
-        linear[0],
-        Parameter('sine', 'a cos(phi)', '1', 'share of the sine', -0.9, 0.9, scale=0.02,
-                  expected=(0.03, 0.03)),
-        Parameter('cosine', 'a sin(phi)', '1', 'share of the cosine', -0.9, 0.9, scale=0.02,
-                  expected=(0.03, 0.03)))
     variants = (('temperature',), ('sine', 'cosine'))
-    waves = (Wave('ripple', 'phase', 'sine', 'cosine'),)
+    waves = (Wave('ripple', 'phase'),)
 
     @classmethod
     def sense(cls, effort: Array, drive: DriveSamples, **parameters: float) -> Array:

@@ -8,27 +8,13 @@ It is linear in the stiffness k and the force at q = 0, -k q_0, so that is what 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Parameter
+from pprs_dynamics.physics.effects.effect import Parameter, Product
 
 FARTHEST = 1000.0  # [m, rad], of the relaxed position: from there a spring is a constant force
-
-
-def relaxed_position(k: float, force: float) -> tuple[float, float]:
-    """Return k and q_0 = -force / k.
-
-    A force with next to no stiffness becomes the softest spring that reaches it from the farthest
-    position allowed.
-    """
-    k = math.copysign(max(abs(k), abs(force) / FARTHEST), k)
-    position = 0.0 - force / k if k else 0.0
-    return k, max(-FARTHEST, min(FARTHEST, position))
 
 
 class DriveSpring(DriveEffect):
@@ -62,24 +48,11 @@ class DriveSpring(DriveEffect):
     linear = (
         Parameter('stiffness', 'k', 'N/m', 'force per position', -1e6, 1e6, scale=10.0),
         Parameter('position', 'q_0', 'm', 'position at which it is relaxed', -FARTHEST, FARTHEST,
-                  scale=0.05))
-    coefficients = (
-        linear[0],
-        Parameter('force', '-k q_0', 'N', 'force at position 0', -1e9, 1e9, scale=0.5))
+                  scale=0.05, product=Product(
+                      Parameter('force', '-k q_0', 'N', 'force at position 0', -1e9, 1e9,
+                                scale=0.5), 'stiffness', sign=-1.0, farthest=FARTHEST)))
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (q, 1)."""
         return (drive.position, np.ones_like(drive.position))
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the stiffness and -k q_0."""
-        return {'stiffness': values['stiffness'],
-                'force': -values['stiffness'] * values['position']}
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return k and q_0; see `relaxed_position`."""
-        k, position = relaxed_position(coefficients['stiffness'], coefficients['force'])
-        return {'stiffness': k, 'position': position}

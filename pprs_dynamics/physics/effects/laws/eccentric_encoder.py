@@ -62,12 +62,7 @@ class EccentricEncoder(MeasurementEffect):
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN, is_angle=True))
     shape = (Parameter('pitch', 'p', 'm', 'travel of the drive in a turn of the encoder', 1e-6,
                        10.0, scale=1e-3),)
-    coefficients = tuple(
-        Parameter(name, symbol, 'm', description, -0.1, 0.1, scale=1e-4, turning=(-0.5, 0.5))
-        for name, symbol, description in (
-            ('sine', 'A cos phi', 'amplitude of the sine'),
-            ('cosine', 'A sin phi', 'amplitude of the cosine')))
-    waves = (Wave('amplitude', 'phase', 'sine', 'cosine'),)
+    waves = (Wave('amplitude', 'phase'),)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:

@@ -65,17 +65,10 @@ class ForceRipple(DriveEffect):
         Parameter('second_phase', 'phi_2', 'rad', 'its phase at position 0', -TURN, TURN, 0.0,
                   is_angle=True))
     shape = (Parameter('pitch', 'p', 'm', 'distance of one period', 1e-6, 10.0, scale=1e-3),)
-    coefficients = tuple(
-        Parameter(name, symbol, 'N', description, -1e6, 1e6, scale=0.3)
-        for name, symbol, description in (
-            ('sine', 'A cos phi', 'amplitude of the sine'),
-            ('cosine', 'A sin phi', 'amplitude of the cosine'),
-            ('second_sine', 'A_2 cos phi_2', 'amplitude of the second sine'),
-            ('second_cosine', 'A_2 sin phi_2', 'amplitude of the second cosine')))
     scanned = ('sine', 'cosine')
     is_wave = True
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
-    waves = (Wave('force', 'phase', 'sine', 'cosine'),
+    waves = (Wave('force', 'phase'),
              Wave('second', 'second_phase', 'second_sine', 'second_cosine'))
 
     @classmethod

@@ -88,7 +88,7 @@ class JointFrictionEffect(PassiveJointEffect):
             Parameter(coulomb, 'mu', '1', f'dry friction of {joint} over its load', -100.0,
                       100.0, 0.0, scale=0.1))
         first = () if is_alike else ((viscous,), (torque,), names[:2])
-        return linear, linear, (*first, (coulomb,))
+        return linear, (*first, (coulomb,))
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST, relaxed_position
+from pprs_dynamics.physics.effects.effect import Parameter, Product
+from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, OfPlace
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
@@ -71,34 +70,14 @@ class JointSpring(BodyEffect):
         units = DriveUnits(turns)
         stiffness = Parameter(f'{joint}.stiffness', 'k', units.of('N/m'), f'stiffness in {joint}',
                               -1e6, 1e6, 0.0, scale=0.1)
-        position = Parameter(f'{joint}.position', 'q_0', units.position,
-                             f'position of {joint} at which it is slack', -FARTHEST, FARTHEST, 0.0,
-                             scale=0.1)
         moment = Parameter(f'{joint}.moment', 'M', units.effort,
                            f'what it does at position 0 of {joint}, -k q_0', -1e6, 1e6, 0.0,
                            scale=0.1)
-        return ((stiffness, position), (stiffness, moment),
-                () if is_alike else ((stiffness.name, moment.name),))
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return k and M = -k q_0 of each joint."""
-        found = {}
-        for joint, _ in cls.places:
-            k = values.get(f'{joint}.stiffness', 0.0)
-            found[f'{joint}.stiffness'] = k
-            found[f'{joint}.moment'] = 0.0 - k * values.get(f'{joint}.position', 0.0)
-        return found
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return k and q_0 of each joint; see `relaxed_position`."""
-        found = {}
-        for joint, _ in cls.places:
-            found[f'{joint}.stiffness'], found[f'{joint}.position'] = relaxed_position(
-                coefficients.get(f'{joint}.stiffness', 0.0),
-                coefficients.get(f'{joint}.moment', 0.0))
-        return found
+        position = Parameter(f'{joint}.position', 'q_0', units.position,
+                             f'position of {joint} at which it is slack', -FARTHEST, FARTHEST, 0.0,
+                             scale=0.1, product=Product(moment, stiffness.name, sign=-1.0,
+                                                        farthest=FARTHEST))
+        return (stiffness, position), () if is_alike else ((stiffness.name, moment.name),)
 
     def load(self, state: MechanismState) -> StructureLoad:
         """Return k q + M in each joint."""

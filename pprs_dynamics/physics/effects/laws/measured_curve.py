@@ -154,7 +154,7 @@ class MeasuredCurve(DriveEffect):
 
     @classmethod
     def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
-                 turns: bool | None = None) -> dict[str, Any]:
+                 turns: bool = False) -> dict[str, Any]:
         for key, value in values.items():
             if key not in RULES:
                 raise UnknownNameError('key', f'{prefix}.{key}',

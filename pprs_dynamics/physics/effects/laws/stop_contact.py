@@ -54,19 +54,13 @@ class StopContact(DriveEffect):
                        FARTHEST, scale=0.01),)
     variants = (('upper',), ('lower',))
     is_positive = True
+    is_smooth = True
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return how far the drive is above q_s, and below it with its sign."""
         beyond = drive.position - shape['position']
         return np.maximum(beyond, 0.0), np.minimum(beyond, 0.0)
-
-    @classmethod
-    def averaged(cls, drive: DriveSamples, period: float,
-                 shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Return the columns at mean positions, which they change little about."""
-        beyond = drive.position - np.array([shape['position'] for shape in shapes])[:, None]
-        return np.stack((np.maximum(beyond, 0.0), np.minimum(beyond, 0.0)), axis=1)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:
