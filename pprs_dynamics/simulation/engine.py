@@ -19,7 +19,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError, ModelError
 from pprs_dynamics.physics.mechanism.description import (
-    Frame,
     body_at,
     inertial_in,
     principal_inertia,
@@ -31,7 +30,7 @@ from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.engine_state import SITE, TOOL, EngineMotion, EngineState
+from pprs_dynamics.simulation.engine_state import TOOL, EngineMotion, EngineState, add_sites
 from pprs_dynamics.simulation.platform import PlatformMechanism
 
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
@@ -89,15 +88,8 @@ class MechanismEngine:
             if row and row not in of_row:
                 of_row[row], self._frames[row] = name, frame
                 self._prevent_short_cuts(spec.body(name))
-        tool, t = structure.links[structure.tool], structure.tables
-        sites = {TOOL: tool} | {
-            f'{side}{k}': (int(row), Frame(R[k], p[k])) for side, rows, R, p in (
-                ('a', t.loop_a, t.a_R, t.a_p), ('b', t.loop_b, t.b_R, t.b_p))
-            for k, row in enumerate(rows)}
-        for site, (row, frame) in sites.items():
-            body = spec.body(of_row[row]) if row else spec.worldbody
-            there = self._frames[row].inverse @ frame
-            body.add_site(name=f'{SITE}{site}', pos=there.p, quat=self._quaternion(there.R))
+        add_sites(mujoco, spec, structure, {0: (spec.worldbody, self.root)} | {
+            row: (spec.body(name), self._frames[row]) for row, name in of_row.items()})
         self.model = spec.compile()
         self.links = {0: 0} | {row: int(self.model.body(name).id) for row, name in of_row.items()}
         for name, row in structure.rows.items():  # of several joints on a body
@@ -112,7 +104,8 @@ class MechanismEngine:
         hangs = np.eye(self.model.nbody)
         for number in range(self.model.nbody - 1, 0, -1):
             hangs[self.model.body_parentid[number]] += hangs[number]
-        a, b = ([self.links[int(row)] for row in rows] for rows in (t.loop_a, t.loop_b))
+        a, b = ([self.links[int(row)] for row in rows] for rows in (
+            structure.tables.loop_a, structure.tables.loop_b))
         # 1 where a closure's force on its second link acts through a body, -1 on its first.
         self._behind = hangs[:, b] - hangs[:, a]
         self._nearby: Array | None = None

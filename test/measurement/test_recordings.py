@@ -103,6 +103,14 @@ def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
     np.testing.assert_array_equal(copy.time, recording.time)
 
 
+def test_a_bag_is_written_of_arrays_in_any_order(tmp_path: Path) -> None:
+    arrays = measured(60)
+    recording = Recording.from_arrays(
+        'x', *(np.asfortranarray(arrays[name]) for name in ('time', *QUANTITIES)), DRIVES)
+    write_recording(tmp_path / 'x.mcap', recording)
+    assert_same(read_recording(tmp_path / 'x.mcap'), arrays)
+
+
 @settings(max_examples=40,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60),
@@ -204,6 +212,29 @@ def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> Non
     recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
     assert_same(recording, arrays)
     assert the_one(recording, 'incomplete_messages').count == 20
+
+
+@pytest.mark.parametrize('offset', [None, 0.02, 0.5])
+def test_two_publishers_on_one_topic_are_no_recording(
+    offset: float | None, tmp_path: Path,
+) -> None:
+    arrays = measured(200)
+    other = measured(200, seed=1)['position'] + offset if offset else np.zeros((200, len(DRIVES)))
+    mixed = [state for pair in zip(states_of(arrays), states_of(
+        arrays, time=arrays['time'] + 0.0007, position=other), strict=True) for state in pair]
+    with pytest.raises(UnreadableFileError, match='two nodes publish there'):
+        read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
+
+
+def test_a_message_that_names_a_drive_twice_is_not_used(tmp_path: Path) -> None:
+    arrays = measured(60)
+    double = [message(1, [*DRIVES, DRIVES[0]], np.ones(7), np.ones(7), np.ones(7))] * 20
+    mixed = read_recording(write_plain_bag(
+        tmp_path / 'mixed', {'/joint_states': [*states_of(arrays), *double]}))
+    assert_same(mixed, arrays)
+    assert the_one(mixed, 'incomplete_messages').count == 20
+    with pytest.raises(UnreadableFileError, match=f'name {DRIVES[0]} twice'):
+        read_recording(write_plain_bag(tmp_path / 'double', {'/joint_states': double}))
 
 
 def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> None:

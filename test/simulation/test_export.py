@@ -194,6 +194,25 @@ def test_a_single_axis(kind: str, gravity: float, tmp_path: Path) -> None:
     assert result['replay_error'] == pytest.approx(np.sqrt(np.mean(left ** 2)), abs=1e-3)
 
 
+LINK = ('<link name="{}"><inertial><origin xyz="0.1 0.02 0"/><mass value="2"/><inertia ixx="0.02" '
+        'iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial></link>')
+JOINT = ('<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><origin '
+         'xyz="0.3 0 0.1"/><axis xyz="0 1 0"/><limit lower="-2" upper="2"/></joint>')
+
+
+@pytest.mark.parametrize('kind', [MJCF, URDF])
+def test_a_locked_joint_is_rigid_in_the_file(kind: str, tmp_path: Path) -> None:
+    (tmp_path / 'arm.urdf').write_text(
+        '<robot name="arm"><link name="base"/>' + JOINT.format('elbow', 'base', 'upper')
+        + LINK.format('upper') + JOINT.format('wrist', 'upper', 'hand') + LINK.format('hand')
+        + '</robot>')
+    (tmp_path / 'arm.yaml').write_text(
+        '/**:\n  ros__parameters:\n    robot: {urdf: arm.urdf, base: base, tool: hand, '
+        'drives: [elbow], locked: {wrist: 0.7}}\n')
+    _, result = exported(tmp_path / 'arm.yaml', kind, tmp_path)
+    assert result['replay_error'] < 1e-9
+
+
 def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -193,6 +193,18 @@ def test_another_reading_of_the_description_is_refused(
         MechanismEngine(model)
 
 
+def test_bodies_and_joints_of_an_mjcf_need_no_names(tmp_path: Path) -> None:
+    (tmp_path / 'robot.xml').write_text(
+        '<mujoco><worldbody><body><joint axis="0 1 0"/><inertial pos="0.1 0 0.1" mass="2" '
+        'diaginertia="0.02 0.03 0.04"/><body pos="0.3 0 0"><joint axis="0 0 1"/><inertial '
+        'pos="0.1 0.1 0" mass="1" diaginertia="0.02 0.03 0.04"/></body></body></worldbody>'
+        '</mujoco>')
+    path = tmp_path / 'robot.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: world, '
+                    'tool: body_2, drives: [joint_0, joint_1]}\n')
+    MechanismEngine(DriveModel.load(path))
+
+
 def test_a_loop_that_is_open_in_mujoco_is_refused(tmp_path: Path) -> None:
     model = DriveModel.load(robots.hexapod().write(tmp_path))
     urdf = Path(model.robot.structure.description.path)

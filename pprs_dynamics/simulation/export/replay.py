@@ -3,8 +3,8 @@
 
 """A motion replayed in MuJoCo by inverse dynamics of an exported file, against the model.
 
-Closures come from the file; those that URDF cannot hold are put back from the model first. Closures
-and dry friction are evaluated exactly here, not by the engine's soft constraints.
+Closures of the file must be closed. They and dry friction are evaluated exactly here, not by the
+engine's soft constraints.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState
-from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot, closures
+from pprs_dynamics.simulation.engine_state import OPEN, EngineState, add_sites
+from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot
 from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
@@ -41,29 +42,32 @@ def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion
     drives : JointMotion
     """
     mujoco = load_engine('the replay of an exported model')
-    spec = mujoco.MjSpec.from_string(text)
+    structure, spec = robot.mechanism.structure, mujoco.MjSpec.from_string(text)
     if kind != MJCF:
         spec.option.gravity = robot.mechanism.gravity
-        _close(mujoco, spec, robot)
+    add_sites(mujoco, spec, structure, {0: (spec.worldbody, Frame())} | {
+        body.row: (spec.body(body.name), Frame()) for body in robot.bodies})
     model = spec.compile()
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     model.opt.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONTACT
                                | mujoco.mjtDisableBit.mjDSBL_LIMIT)
-    state = EngineState(mujoco, model, robot.mechanism.structure, Frame())
-    data = state.data
-    motion = robot.mechanism.at(drives.position, drives.velocity, drives.acceleration)
-    position, velocity, acceleration = state.coordinates(motion)
-    found = np.empty_like(drives.position)
+    state = EngineState(mujoco, model, structure, Frame())
+    data, closed = state.data, state.closed(
+        robot.mechanism.at(drives.position, drives.velocity, drives.acceleration))
+    needed = np.empty_like(closed.velocity)
     for k in range(len(drives)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = position[k], velocity[k], acceleration[k]
+        data.qpos[:], data.qvel[:], data.qacc[:] = (
+            closed.position[k], closed.velocity[k], closed.acceleration[k])
         mujoco.mj_inverse(model, data)
-        closing = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        off = np.abs(data.efc_pos[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY])
+        if off.max(initial=0.0) > OPEN:
+            raise ModelError(f'the {kind} file', f'a closure is open by {off.max():.3g}',
+                             'have the loops of the model: please report this model')
         # Dry friction by its law, in the place of the engine's constraints.
-        found[k] = state.driven(
-            data.qfrc_inverse + data.qfrc_constraint
-            + model.dof_frictionloss * np.tanh(data.qvel / AT_ONCE),
-            data.efc_J.reshape(-1, model.nv)[closing])
-    return found
+        needed[k] = (data.qfrc_inverse + data.qfrc_constraint
+                     + model.dof_frictionloss * np.tanh(data.qvel / AT_ONCE))
+    efforts: Array = np.einsum('nvd,nv->nd', closed.rates, needed)
+    return efforts
 
 
 @dataclass(frozen=True)
@@ -107,24 +111,3 @@ def _excitation(model: DriveModel) -> Any:
     if model.moves_joints:
         return draw_motion(model, DURATION, 0)
     return Excitation(duration=DURATION).motion(time)
-
-
-def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:
-    """Put back the closures and couplings that a URDF lacks, or that MuJoCo does not read."""
-    structure = robot.mechanism.structure
-    names = {body.row: body.name for body in robot.bodies}
-    for name, sites, weld in closures(structure):
-        for site, row, frame in sites:
-            quaternion = np.empty(4)
-            mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame.R).ravel())
-            body = spec.body(names[row]) if row else spec.worldbody
-            body.add_site(name=site, pos=frame.p, quat=quaternion)
-        equality = spec.add_equality(name=name, name1=sites[0][0], name2=sites[1][0])
-        equality.type = mujoco.mjtEq.mjEQ_WELD if weld else mujoco.mjtEq.mjEQ_CONNECT
-        equality.objtype = mujoco.mjtObj.mjOBJ_SITE
-    known = {equality.name1 for equality in spec.equalities}
-    for name, leader, ratio, offset in structure.couplings:
-        if name not in known:
-            equality = spec.add_equality(name1=name, name2=leader)
-            equality.type, equality.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
-            equality.data[:2] = offset, ratio
