@@ -26,6 +26,7 @@ from pprs_dynamics.ros.force_command import (
     Feedforward,
     ForceCommand,
     parameters_for,
+    warn_without_limits,
 )
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, efforts, joint_state
 from pprs_dynamics.ros.messages.incoming_bytes import only_whole
@@ -93,7 +94,8 @@ class FeedforwardNode(ManagedNode):
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
         self._status = StatusReporter(
-            self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
+            self, {}, self._counters, hardware_of(self._settings.model), self._refresh,
+            ('~/commands',))
         self._refresh()
         self.begin(node_values[AUTOSTART.name])
 
@@ -104,6 +106,7 @@ class FeedforwardNode(ManagedNode):
         model = self._settings.model
         self.get_logger().info(
             f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
+        warn_without_limits(self, model, self._settings.node_values)
         return super().on_activate(state)
 
     def _create_topics(self) -> None:

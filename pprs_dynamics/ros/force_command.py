@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.arrays import Array
@@ -235,9 +236,7 @@ class Feedforward:
         if node_values['missing_derivatives'] == SPLINE:
             load_splines()
         self._clamps = node_values['limit_policy'] == CLAMP
-        self._limits: DriveLimits = model.limits
-        if node_values['effort_limits']:
-            self._limits = model.limits.with_efforts(node_values['effort_limits'])
+        self._limits = limits_of(model, node_values)
 
     @property
     def parts(self) -> list[str]:
@@ -446,6 +445,21 @@ class Feedforward:
         assert self._epoch is not None  # `answer` sets it
         return request.motion.with_time(
             (request.start - self._epoch + request.offsets) / NANOSECONDS)
+
+
+def limits_of(model: DriveModel, node_values: Mapping[str, Any]) -> DriveLimits:
+    """Return the limits of what goes out: of the model, and smaller ones of the node."""
+    given = node_values['effort_limits']
+    return model.limits.with_efforts(given) if given else model.limits
+
+
+def warn_without_limits(node: Node, model: DriveModel, node_values: Mapping[str, Any]) -> None:
+    """Warn in the log of drives whose effort nothing limits."""
+    efforts = limits_of(model, node_values).efforts
+    if free := [name for name, most in zip(model.drives, efforts, strict=True) if np.isinf(most)]:
+        node.get_logger().warning(
+            f'no limit of effort is known for {", ".join(free)}: every finite effort that a '
+            'trajectory asks for goes out; set limits.effort in the model file, or effort_limits')
 
 
 def _path_of(command: ForceCommand) -> DrivePath:

@@ -30,7 +30,13 @@ from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.ros.force_command import STILL, DriveTrajectory, Feedforward, parameters_for
+from pprs_dynamics.ros.force_command import (
+    STILL,
+    DriveTrajectory,
+    Feedforward,
+    parameters_for,
+    warn_without_limits,
+)
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import only_whole
@@ -65,6 +71,7 @@ SETTLING = 0.02
 # Share of a goal's motion before the end of which the answer that it is reached is not believed;
 # a controller's clock and its last cycles take less.
 LEFT_AT_MOST = 0.1
+MOST_SCALING = 10.0  # of the speed that a controller may report; larger ones are no factor of it
 
 
 class TrajectoryProxyNode(Node):
@@ -85,6 +92,7 @@ class TrajectoryProxyNode(Node):
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
                                       hardware_of(self._settings.model), self._refresh)
         self._refresh()
+        warn_without_limits(self, self._settings.model, node_values)
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
         self._server = ActionServer(
@@ -147,7 +155,8 @@ class TrajectoryProxyNode(Node):
 
     def _on_controller(self, state: Any) -> None:
         """Let the controller hold with gravity where it would hold without."""
-        self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
+        if state.speed_scaling_factor <= MOST_SCALING:
+            self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
         self._controller.heard(state, self._counters['passed_on'] > 0)
         # In the middle of a goal, which has its own efforts, a hold would replace it.
         if not self._relay.is_idle or (reference := self._controller.take_hold()) is None:

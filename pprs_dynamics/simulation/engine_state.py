@@ -18,7 +18,6 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -28,6 +27,7 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
     A_P,
     A_R,
+    AXES,
     B_P,
     B_R,
     KIND,
@@ -165,8 +165,8 @@ class EngineState:
         velocity, acceleration = np.zeros((2, len(m.q), self.model.nv))
         for q, v, row in self._free:
             position[:, q:q + 3] = (m.p[:, row] - root.p) @ root.R
-            attitude = Rotation.from_matrix(root.R.T @ m.R[:, row])
-            position[:, q + 3:q + 7] = np.roll(attitude.as_quat(), 1, axis=1)
+            for place, R in zip(position, root.R.T @ m.R[:, row], strict=True):
+                self.engine.mju_mat2Quat(place[q + 3:q + 7], R.ravel())
             for own, linear, angular in ((velocity, m.u, m.w), (acceleration, m.ud, m.wd)):
                 own[:, v:v + 3] = linear[:, row] @ root.R
                 own[:, v + 3:v + 6] = np.einsum('nji,nj->ni', m.R[:, row], angular[:, row])
@@ -204,11 +204,12 @@ class EngineState:
                     turns[n, k] += sign * angular
         rows = t.rows[:len(t.passive)]
         of_loop, slides = rows[:, LOOP], rows[:, KIND] == TRANSLATION
+        leads = frames[:, of_loop, A_R:A_R + 3, rows[:, AXES]].swapaxes(0, 1)  # (samples, rows, 3)
+        off = np.einsum('nri,nri->nr', leads, (frames[:, :, B_P] - frames[:, :, A_P])[:, of_loop])
         m: Any = SimpleNamespace(loops=np.moveaxis(frames, 0, -1))  # equations on arrays
-        self._require_closed(position, [(self.structure.loops[k].name, residual(t, m, r))
-                                        for r, k in enumerate(of_loop)])
-        leads = np.array([row_axis(t, m, r) for r in range(len(rows))]).reshape(
-            len(rows), 3, samples).transpose(2, 0, 1)
+        for r in np.flatnonzero(~slides).tolist():
+            leads[:, r], off[:, r] = np.array([*row_axis(t, m, r)]).T, residual(t, m, r)
+        self._require_closed(position, off)
         first, drives = len(self._fixed_rows), len(self.drives)
         J = np.empty((samples, first + len(rows), nv))
         J[:, :first] = self._fixed_rows
@@ -218,7 +219,7 @@ class EngineState:
                    else np.linalg.pinv(J, rcond=LEAST_SINGULAR))
         # By J^-T efforts of the tree become those of the rows.
         reactions = np.zeros((samples, loops, 3, nv))
-        for r in np.flatnonzero(slides):
+        for r in np.flatnonzero(slides).tolist():
             reactions[:, of_loop[r]] += leads[:, r, :, None] * inverse[:, None, :, first + r]
         return EngineMotion(position, velocity, acceleration, inverse[:, :, :drives], turns,
                             reactions)
@@ -236,15 +237,18 @@ class EngineState:
             row[follower], row[leader] = 1.0, -ratio
         return rows
 
-    def _require_closed(self, position: Array, closures: list[tuple[str, Array]]) -> None:
-        """Raise ModelError where a row of a closure, or a coupled joint, is open."""
+    def _require_closed(self, position: Array, off: Array) -> None:
+        """Raise ModelError where a row of a closure (N, r), or a coupled joint, is open."""
         at = self.model.jnt_qposadr
-        for name, off in (*closures, *(
-                (self.joints[a], position[:, at[a]] - ratio * position[:, at[b]] - offset)
-                for a, b, ratio, offset in self.couplings)):
-            if np.max(np.abs(off)) > OPEN:
-                raise ModelError(name, f'open by {np.max(np.abs(off)):.3g} in MuJoCo',
-                                 'be closed as in the model: please report this file')
+        coupled = [position[:, at[a]] - ratio * position[:, at[b]] - offset
+                   for a, b, ratio, offset in self.couplings]
+        largest = np.abs(np.column_stack((off, *coupled))).max(axis=0, initial=0.0)
+        if np.max(largest, initial=0.0) > OPEN:
+            k = int(np.argmax(largest))
+            name = (self.structure.loops[self.structure.tables.rows[k, LOOP]].name
+                    if k < off.shape[1] else self.joints[self.couplings[k - off.shape[1]][0]])
+            raise ModelError(name, f'open by {largest[k]:.3g} in MuJoCo',
+                             'be closed as in the model: please report this file')
 
 
 def add_sites(engine: Any, spec: Any, structure: Structure,

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, compare
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job, run_in_process
@@ -82,7 +82,8 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     assert math.isnan(session.errors()['lift_2'].noise)
 
 
-@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',)])
+@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), pytest.param(
+    ('time_delay',), marks=pytest.mark.slow)])
 def test_errors_that_are_shown_are_those_of_compare_after_export(
     session: Session, recording: Path, tmp_path: Path, ticks: tuple[str, ...],
 ) -> None:
@@ -173,6 +174,9 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) ->
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)
     assert session.jobs.diagnosis is not None
+    noise = compare(DriveModel.load(), recording).comparison.drives
+    for name, error in session.errors().items():
+        assert error.noise == pytest.approx(noise[name].noise_floor, rel=1e-6)
     refused = session.jobs.adopt('drive_spring').result(300)
     assert not refused.adopted
     assert 'explains these recordings better' in refused.reason

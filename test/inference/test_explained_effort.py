@@ -12,6 +12,7 @@ import model_recordings
 import numpy as np
 import pytest
 from made_up_arm import motion, real_arm, record, write_arm
+from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel, compare, diagnose, fit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
@@ -97,9 +98,24 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     quiet = replace(residuals, measured=residuals.measured.copy(), model=residuals.model.copy())
     quiet.measured[:, 0], quiet.model[:, 0] = 3.0 + noise, 3.0
     assert little_explained(model, quiet) == {}
+    # A force that varies more than all that was measured is not hidden in noise.
+    quiet.model[:, 0] += 3 * noise.std() * np.sin(np.arange(len(residuals)) / 50)
+    assert set(little_explained(model, quiet)) == ({'turn'} if size else set())
     still = replace(residuals, measured=residuals.measured.copy(), variables={
         **residuals.variables, 'velocity': residuals.variables['velocity'] * [0.0, 1.0, 1.0]})
     still.measured[:, 0] = 5 * np.sin(np.arange(len(residuals)) / 50)
     assert little_explained(model, still) == {}
     moving = replace(residuals, measured=still.measured)
     assert set(little_explained(model, moving)) == {'turn'}
+
+
+def test_noise_that_is_slow_is_for_no_model_to_explain(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    residuals, _ = measure_residuals(model, [record(model, motion())])
+    size = 1.5 * float(np.nanstd(residuals.model[:, 0]))
+    white = np.random.default_rng(4).normal(size=len(residuals) + 500)
+    slow = size * lfilter([0.1 ** 0.5], [1.0, -0.95], white)[500:]
+    noisy = replace(residuals, measured=residuals.measured.copy())
+    noisy.measured[:, 0] = residuals.model[:, 0] + slow
+    assert set(little_explained(model, noisy)) == {'turn'}
+    assert little_explained(model, noisy, noise={'turn': float(slow.std())}) == {}

@@ -98,6 +98,27 @@ def test_no_other_amplitudes_have_a_higher_likelihood(seed: int) -> None:
     assert deviance(found)[0] - lowest < 1e-3
 
 
+def walk(rng: np.random.Generator) -> np.ndarray:
+    return 0.1 * np.cumsum(rng.normal(size=2000))
+
+
+@pytest.mark.parametrize('peers', [0, 1, 5])
+def test_a_drive_that_drifts_hides_no_offset_of_another(peers: int) -> None:
+    rng = np.random.default_rng(12)
+    of_white, of_slow, offsets = [], [], []
+    for _ in range(60):
+        noise = [rng.normal(size=2000), *[walk(rng)] * (peers > 0), *(
+            ar1(0.9, 2000, rng) for _ in range(peers - 1))]
+        fit = fitted(np.stack(noise, axis=1))[1]
+        beyond = fit.squares[:, 0] > 9 * fit.spectra[:, 0]
+        of_white.append(beyond[0])
+        of_slow += beyond[1:].tolist()
+        offsets.append(4 / np.sqrt(fit.spectra[0, 0]))  # of 4 deviations, in what is fitted
+    assert np.median(offsets) > 3
+    assert np.mean(of_white) <= 0.01
+    assert not of_slow or np.mean(of_slow) <= 0.02
+
+
 def test_a_vibration_is_no_noise() -> None:
     rng = np.random.default_rng(5)
     time = PERIOD * np.arange(4000)

@@ -214,6 +214,29 @@ def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> Non
     assert the_one(recording, 'incomplete_messages').count == 20
 
 
+@pytest.mark.parametrize('offset', [None, 0.02, 0.5])
+def test_two_publishers_on_one_topic_are_no_recording(
+    offset: float | None, tmp_path: Path,
+) -> None:
+    arrays = measured(200)
+    other = measured(200, seed=1)['position'] + offset if offset else np.zeros((200, len(DRIVES)))
+    mixed = [state for pair in zip(states_of(arrays), states_of(
+        arrays, time=arrays['time'] + 0.0007, position=other), strict=True) for state in pair]
+    with pytest.raises(UnreadableFileError, match='two nodes publish there'):
+        read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
+
+
+def test_a_message_that_names_a_drive_twice_is_not_used(tmp_path: Path) -> None:
+    arrays = measured(60)
+    double = [message(1, [*DRIVES, DRIVES[0]], np.ones(7), np.ones(7), np.ones(7))] * 20
+    mixed = read_recording(write_plain_bag(
+        tmp_path / 'mixed', {'/joint_states': [*states_of(arrays), *double]}))
+    assert_same(mixed, arrays)
+    assert the_one(mixed, 'incomplete_messages').count == 20
+    with pytest.raises(UnreadableFileError, match=f'name {DRIVES[0]} twice'):
+        read_recording(write_plain_bag(tmp_path / 'double', {'/joint_states': double}))
+
+
 def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> None:
     left, right = measured(50, seed=1), measured(50, seed=2)
     path = write_plain_bag(tmp_path / 'bag', {

@@ -15,6 +15,7 @@ from feedforward_bench import EQUAL, feedforward_bench, held, message_of, random
 from node_bench import overrides
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -276,6 +277,18 @@ def test_a_second_node_of_its_name_is_told() -> None:
         assert '2 nodes are called /feedforward' in said
         node.bench.executor.remove_node(twin)
         twin.destroy_node()
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
+
+
+def test_another_node_that_commands_the_same_drives_is_told() -> None:
+    with feedforward_bench() as node:
+        node.answer(message_of(MOTION))
+        other = Node('other_controller', context=node.bench.context)
+        topic = node.node.resolve_topic_name('~/commands')
+        other.create_publisher(Float64MultiArray, topic, 1)
+        said = node.wait_for_status(code='CONFLICT', level='WARN')['message']
+        assert f'/other_controller publishes on {topic}' in said
+        other.destroy_node()
         assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from model_recordings import with_effects
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.force_command import Feedforward, warn_without_limits
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import Timing, TrajectoryRequest
 
@@ -195,6 +196,17 @@ def test_an_effort_that_is_not_finite_is_refused_where_nothing_limits_it() -> No
     node = Feedforward(MODEL, {**OWN, 'feedforward_scale': np.nan})
     with pytest.raises(Rejection, match='an effort that is not finite'):
         node.answer(request())
+
+
+def test_drives_that_nothing_limits_are_warned_of() -> None:
+    free = DriveModel.load('config/single_axis.yaml')
+    for model, limits, warned in (
+            (free, (), True), (free, (80.0,), False), (MODEL, (), False)):
+        node = Mock()
+        warn_without_limits(node, model, {'effort_limits': limits})
+        calls = node.get_logger().warning.call_args_list
+        assert [('no limit' in str(call), 'axis' in str(call)) for call in calls] == (
+            [(True, True)] if warned else [])
 
 
 def test_a_pose_beyond_a_stroke_is_refused() -> None:

@@ -136,4 +136,6 @@ def test_what_breaks_a_rule_in_a_part_is_refused_and_the_rest_goes_on(robot: Rob
         robot.send(['c'], k * PERIOD, **({'position': [float('nan')]} if k == 3 else {}))
     assert len(robot.said) == 2
     assert robot.said[1].startswith('NON_FINITE')
+    robot.send(['a', 'b', 'a'], 6 * PERIOD)  # which value is that of the drive is not known
+    assert robot.said[-1].startswith('NAMES')
     robot.check([k * PERIOD for k in range(6) if k != 3])

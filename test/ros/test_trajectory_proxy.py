@@ -79,13 +79,13 @@ class Cell:
             self.node._execute(handle).send(None)
         return handle.ended, ended.value.value
 
-    def state(self, velocity: Any = 0.0, times: int = 3) -> None:
+    def state(self, velocity: Any = 0.0, times: int = 3, scaling: float = 1.0) -> None:
         """Tell the node what a controller says that is at the pose."""
         reference = SimpleNamespace(positions=HELD.drive_motion[0][0].tolist(),
                                     velocities=(np.ones(6) * velocity).tolist())
         for _ in range(times):
             self.node._on_controller(SimpleNamespace(
-                joint_names=list(DRIVES), reference=reference, speed_scaling_factor=1.0,
+                joint_names=list(DRIVES), reference=reference, speed_scaling_factor=scaling,
                 output=SimpleNamespace(effort=[0.0] * 6)))
         self.bench.spin_for(0.3)
 
@@ -143,7 +143,9 @@ def test_a_goal_that_breaks_a_rule_is_refused_when_it_is_asked(cell: Cell) -> No
     assert cell.relay.goals == []
 
 
-def test_a_goal_that_is_reached_too_early_was_replaced(cell: Cell) -> None:
+@pytest.mark.parametrize('scaling', [1.0, np.inf, 1e300, np.nan])
+def test_a_goal_that_is_reached_too_early_was_replaced(cell: Cell, scaling: float) -> None:
+    cell.state(scaling=scaling, times=1)
     ended, result = cell.execute(goal(ALONG, *PATH.drive_motion))
     assert ended == 'aborted'
     assert result.error_code == FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED

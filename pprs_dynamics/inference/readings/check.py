@@ -259,7 +259,7 @@ class Search:
             """Return what a line would change but signs, whose convention a sentence mentions."""
             scales = np.abs(reading.effort_scale)
             positive = replace(reading, load=0.0, scale=np.abs(reading.scale),
-                               offset=reading.offset * np.sign(reading.scale))
+                               offset=reading.offset * np.sign(reading.scale) + 0.0)
             return positive.of_motion + reading.efforts.tobytes() + (
                 scales.tobytes() if np.all(np.isin(scales, table.SCALES)) else b'constants')
 
@@ -273,7 +273,7 @@ class Search:
     def fit(self, reading: Reading) -> Fit | None:
         """Return a reading with its best scales of efforts.
 
-        None where it cannot be, or its score cannot reach the best one.
+        None where it cannot be.
         """
         excerpt = self.excerpts.get(reading.time_unit)
         if excerpt is None or (reading.kinds and not self._possible(reading, excerpt)):
@@ -288,9 +288,6 @@ class Search:
         if not measured:
             return None
         weight, cost = weights[measured], reading.cost + self._outside(reading, excerpt)
-        most = sum(weights[d] * evidence.most(d, reading.efforts[d]) for d in measured) - cost
-        if most < max((fit.score for fit in self.fits), default=-np.inf) - table.SURE:
-            return None
 
         @cache
         def likelihood(d: int, scale: float) -> Likelihood:

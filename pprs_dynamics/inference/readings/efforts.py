@@ -20,7 +20,6 @@ from pprs_dynamics.inference.readings.findings import NoMeasurement, OtherReadin
 from pprs_dynamics.inference.readings.table import named
 from pprs_dynamics.inference.residuals.excerpt import Excerpt
 from pprs_dynamics.measurement.files.recording import Recording, signed
-from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model import recorded_names
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
@@ -29,18 +28,17 @@ KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
          recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
 
 
-def find_sign_bit(recording: Recording) -> Iterator[Defect]:
+def find_sign_bit(recording: Recording) -> Iterator[OtherReading]:
     """Yield efforts that are magnitudes with a bit for their sign, as servos report loads."""
     found: dict[int, list[int]] = {}
-    for d in range(len(recording.drives)):
-        effort = recording.effort[np.isfinite(recording.effort[:, d]), d]
-        if len(effort) < 2 or np.any(effort < 0) or np.any(effort != np.rint(effort)):
+    for d, column in enumerate(recording.effort.T):
+        effort = column[np.isfinite(column)]
+        if len(effort) < 2 or np.any(effort < 0) or np.any(effort % 1 != 0):
             continue
+        rough = table.CALMER * np.abs(np.diff(effort)).sum()
         for bit in table.SIGN_BITS:
-            is_set = effort >= 2.0 ** bit
-            if 0.02 < is_set.mean() < 0.98 and effort.max() < 2.0 ** (bit + 1) and (
-                    np.abs(np.diff(signed(effort, bit))).sum()
-                    < table.CALMER * np.abs(np.diff(effort)).sum()):
+            if 0.02 < np.mean(effort >= 2.0 ** bit) < 0.98 and effort.max() < 2.0 ** (bit + 1) and (
+                    np.abs(np.diff(signed(effort, bit))).sum() < rough):
                 found.setdefault(bit, []).append(d)
     for bit, group in found.items():
         yield OtherReading.of(
@@ -53,21 +51,15 @@ def find_sign_bit(recording: Recording) -> Iterator[Defect]:
 def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evidence: Evidence,
                   ) -> Iterator[OtherReading]:
     """Yield efforts that are recorded without their sign."""
-    force = evidence.force
-    size, strongest = evidence.size, evidence.size.max()
-    followed = np.isfinite(force).all(axis=1)
     unsigned = []
-    for d in np.flatnonzero(size > table.WEAK * strongest).tolist():
-        known = recording.effort[np.isfinite(recording.effort[:, d]), d]
-        rows = followed & np.isfinite(excerpt.effort[:, d])
-        if not len(known) or np.any(known < 0) or not np.any(known) or not np.any(rows):
+    for d in np.flatnonzero(evidence.size > table.WEAK * evidence.size.max()).tolist():
+        known = np.isfinite(excerpt.effort[:, d]) & np.isfinite(evidence.force).all(axis=1)
+        effort, force = excerpt.effort[known, d], evidence.force[known, d]
+        if np.any(recording.effort[:, d] < 0) or not np.any(effort):
             continue
-        effort, model_force = excerpt.effort[rows, d], force[rows, d]
-        below = float(np.sum(np.minimum(model_force, 0.0) ** 2) / np.sum(model_force ** 2))
-        signed_misfit, misfit = (float(np.sum((effort - each) ** 2)) for each in (
-            model_force, np.abs(model_force)))
-        if table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and (
-                table.CLEARLY * misfit < signed_misfit):
+        below = float(np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2))
+        if table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and table.CLEARLY * np.sum(
+                (effort - np.abs(force)) ** 2) < np.sum((effort - force) ** 2):
             unsigned.append(d)
     if unsigned:
         yield OtherReading.of(

@@ -126,12 +126,6 @@ class Evidence:
         rest = np.linalg.norm(self.roots[..., INERTIA], axis=-1)
         return bool(np.any(size > table.WEAK * rest))
 
-    def most(self, drive: int, column: int) -> float:
-        """Return a score that no likelihood of efforts of a drive exceeds, whatever their unit."""
-        left = max(self.roots[drive, column, -1, -1] ** 2, table.CLOSEST * self.swing[
-            drive, column])
-        return -0.5 * table.SAMPLES * float(np.log(left / self.swing[drive, column]))
-
     def is_measured(self, drive: int, column: int) -> bool:
         """Whether there are enough efforts for a regression."""
         return bool(self.count[drive, column] > EFFORT and self.total[drive, column] > 0)

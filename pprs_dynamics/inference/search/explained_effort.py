@@ -61,8 +61,8 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
                      ) -> dict[str, float]:
     """Return the drives of whose effort a model explains little, with the shares; least first.
 
-    Of drives that move, and whose effort is more than white noise: where a drive stands, static
-    friction holds whatever it is loaded with, and noise is for no model to explain.
+    Of drives that move: where a drive stands, static friction holds whatever it is loaded with.
+    White noise is for no model to explain, but a model whose force varies more contradicts it.
 
     Parameters
     ----------
@@ -78,9 +78,14 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
     little = {}
     for name, share in explained_shares(residuals, left).items():
         d = residuals.drives.index(name)
-        most = _beyond_noise(residuals.measured[:, d], noise.get(name, 0.0))
-        if share < decisions.explained * most and _can_be_explained(
-                model, residuals, d, decisions):
+        if not _moves(model, residuals, d):
+            continue
+        effort = residuals.measured[:, d]
+        if _is_white_noise(residuals, d, decisions):
+            is_little = np.nanvar(residuals.model[np.isfinite(effort), d]) > np.nanvar(effort)
+        else:
+            is_little = share < decisions.explained * _beyond_noise(effort, noise.get(name, 0.0))
+        if is_little:
             little[name] = share
     return dict(sorted(little.items(), key=lambda one: one[1]))
 
@@ -90,17 +95,19 @@ def _beyond_noise(effort: Array, noise: float) -> float:
     return max(1 - noise ** 2 / max(float(np.nanvar(effort)), 1e-300), 0.0)
 
 
-def _can_be_explained(model: DriveModel, residuals: Residuals, d: int,
-                      decisions: Decisions) -> bool:
-    """Return whether a drive moves, and the variance of its effort is not mostly white noise."""
+def _moves(model: DriveModel, residuals: Residuals, d: int) -> bool:
+    """Return whether a drive moves, as far as its velocity is known."""
     velocity = residuals.variable('velocity', d)
     width = float(model.reversal.widths(len(residuals.drives))[d])
-    if velocity is not None and np.mean(np.abs(velocity) > TURNED * width) < LEAST_MOVING:
-        return False
+    return velocity is None or bool(np.mean(np.abs(velocity) > TURNED * width) >= LEAST_MOVING)
+
+
+def _is_white_noise(residuals: Residuals, d: int, decisions: Decisions) -> bool:
+    """Return whether the variance of a drive's effort is mostly white noise."""
     squares = [np.diff(residuals.measured[part, d], 3) ** 2 for part in residuals.stretches(d)]
     every = np.concatenate(squares)
     every = every[np.isfinite(every)]
     if not len(every):
-        return True
+        return False
     white = float(every.mean()) / THIRD_DIFFERENCES
-    return white < decisions.explained * float(np.nanvar(residuals.measured[:, d]))
+    return white >= decisions.explained * float(np.nanvar(residuals.measured[:, d]))

@@ -15,6 +15,7 @@ import numpy as np
 
 from pprs_dynamics.drives import DriveColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.files import signals
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
@@ -99,10 +100,19 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
     if not done:
         raise UnreadableFileError(bag.path, f'{name} holds no messages')
     if not blocks.samples:
+        if blocks.twice:
+            raise UnreadableFileError(
+                bag.path, f'messages on {name} name {", ".join(sorted(blocks.twice))} twice: which '
+                'value is that of the drive is not known; record each joint once')
         if set(drives) <= blocks.names:  # spread over several messages
             return read_merged(bag, connections, drives, findings)
         _tell_missing(bag.path, name, drives, blocks)
     stamps, received, position, velocity, effort = blocks.arrays()
+    if mixed := [drive for drive, values in zip(drives, position.T, strict=True)
+                 if signals.alternates(values)]:
+        raise UnreadableFileError(
+            bag.path, f'the position of {", ".join(mixed)} on {name} jumps back and forth from '
+            'message to message: two nodes publish there; record one of them')
     others = [one for one in bag.connections if one.msgtype == JOINT_STATE
               and one.topic != name and channel_of(one.topic, one.msgtype) is None]
     if topic is None and others and np.all(np.isnan(effort)):
@@ -276,5 +286,5 @@ def _ignored(
         findings.append(Defect(
             'incomplete_messages', skipped,
             f'{counted(skipped, "message")} of {messages} on {topic} '
-            f'without positions of all of {", ".join(drives)}'))
+            f'without one position each of {", ".join(drives)}'))
     return findings

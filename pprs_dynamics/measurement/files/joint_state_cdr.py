@@ -115,6 +115,7 @@ class JointStateBlocks:
     def __init__(self, drives: tuple[str, ...]) -> None:
         self.drives = drives
         self.names: set[str] = set()
+        self.twice: set[str] = set()  # drives that a message names more than once
         self.samples = 0
         self._blocks: list[tuple[Indices, Indices, Array]] = []
 
@@ -153,8 +154,11 @@ class JointStateBlocks:
     def _place(
         self, names: tuple[str, ...], arrays: Sequence[Array], rows: Indices, values: Array,
     ) -> bool:
-        """Put arrays, (n, joints) each, into their rows; return whether they hold all drives."""
+        """Put arrays, (n, joints) each, into their rows; return if all drives are there once."""
         self.names.update(names)
+        if twice := {drive for drive in self.drives if names.count(drive) > 1}:
+            self.twice |= twice
+            return False
         if arrays[0].shape[1] != len(names) or not {*self.drives} <= {*names}:
             return False
         columns = [names.index(drive) for drive in self.drives]

@@ -21,6 +21,7 @@ SURROUNDINGS = 5
 # A jump that is undone within this many samples is a spike; the remainder may be this part.
 SPIKE_SAMPLES = 3
 SPIKE_REMAINDER = 0.1
+MOSTLY = 0.8  # of the steps of a position go back: messages of two publishers in turn
 # Damaged rows: at most this share of the values, farther from the middle of all others than this
 # many of their ranges.
 FEW, FAR = 0.005, 10.0
@@ -87,6 +88,15 @@ def find_jumps(samples: Samples) -> Jumps:
                 at = int(np.searchsorted(fast, back)) + 1
     found.jumps.sort()
     return found
+
+
+def alternates(values: Array) -> bool:
+    """Return whether positions (N,) are those of two motions in turn, as of two publishers."""
+    steps = np.diff(values)
+    if len(steps) < 2:
+        return False
+    back = np.abs(steps[1:] + steps[:-1]) < SPIKE_REMAINDER * np.abs(steps[1:])
+    return bool(np.mean(back) > MOSTLY)
 
 
 def far_from_the_rest(values: Array, longest: int) -> Mask:

@@ -155,13 +155,15 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False,
     Raises
     ------
     Rejection
-        Where a drive is missing, the field's length is not that of `name`, or a value is not
-        finite, or is beyond `LARGEST`.
+        Where a drive is missing or named twice, the field's length is not that of `name`, or a
+        value is not finite, or is beyond `LARGEST`.
     """
     names, values = list(message.name), getattr(message, field)
     missing = [drive for drive in drives if drive not in names]
     if missing:
         raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
+    if twice := [drive for drive in drives if names.count(drive) > 1]:
+        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {twice[0]} once')
     if len(values) != len(names):
         raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
                         f'{len(names)}, as name')

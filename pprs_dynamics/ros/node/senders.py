@@ -20,6 +20,7 @@ from rclpy.node import Node
 TURNS = 1.0
 MOST = 32  # publishers that are remembered
 PASSED_OVER = 'superseded'
+GONE = '_NODE_NAME_UNKNOWN_'  # of a node that was destroyed, but not its publishers
 
 
 class Senders:
@@ -65,11 +66,13 @@ class Senders:
         return self._clock() - self._changes[1] < TURNS
 
 
-def publishers_of(node: Node, topic: str) -> str:
-    """Return the names of the nodes that publish on a topic, as discovery knows them."""
+def publishers_of(node: Node, topic: str, others: bool = False) -> str:
+    """Return the nodes that publish on a topic, or the other ones, as discovery knows them."""
+    this = node.get_fully_qualified_name() if others else ''
     return ', '.join(sorted({
         f'{found.node_namespace.rstrip("/")}/{found.node_name}'
-        for found in node.get_publishers_info_by_topic(node.resolve_topic_name(topic))}))
+        for found in node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
+        if found.node_name != GONE} - {this}))
 
 
 def namesakes(node: Node) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from pprs_dynamics.ros.messages.status_codes import LEVELS, Code, Level
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.qos import LATCHED, publisher
-from pprs_dynamics.ros.node.senders import namesakes
+from pprs_dynamics.ros.node.senders import namesakes, publishers_of
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -49,13 +49,15 @@ class StatusReporter:
         Name of the robot on `/diagnostics`.
     refresh : callable, optional
         Called once a second before the status goes out, to bring `facts` up to date.
+    commanded : sequence of str, optional
+        Topics on which no other node may publish.
     """
 
     def __init__(
         self, node: Node, facts: dict[str, Any], counters: dict[str, int],
-        hardware: str, refresh: Callable[[], None] | None = None,
+        hardware: str, refresh: Callable[[], None] | None = None, commanded: Sequence[str] = (),
     ) -> None:
-        self._node, self._counters = node, counters
+        self._node, self._counters, self._commanded = node, counters, commanded
         self.facts = {'robot': hardware, **facts}
         self._hardware, self._refresh = hardware, refresh
         self._publisher = publisher(node, String, '~/status', LATCHED)
@@ -97,6 +99,12 @@ class StatusReporter:
             level, code, message = 'WARN', 'CONFLICT', (
                 f'{others + 1} nodes are called {self._node.get_fully_qualified_name()}, and each '
                 'answers on the same topics; one that was killed is among them for 20 s')
+        elif level == 'OK':
+            for topic in self._commanded:
+                if rivals := publishers_of(self._node, topic, others=True):
+                    level, code, message = 'WARN', 'CONFLICT', (
+                        f'{rivals} publishes on {self._node.resolve_topic_name(topic)} as well: '
+                        'the drives follow both in turn')
         content = {'level': level, 'code': code, 'message': message,
                    'counters': self._counters, **self.facts}
         self._publisher.publish(String(data=json.dumps(content)))
