@@ -33,6 +33,7 @@ from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -81,7 +82,10 @@ class FittedSets:
         """
         found = FittedSets(self.design.around(point, alone), self.decisions,
                            self.regression.error_scale)
-        found.components.propose_as(self.components)
+        # Behind another sensor of efforts every row looks otherwise.
+        if not any(issubclass(effect.effect, MeasurementEffect)
+                   and not effect.effect.shifts_positions() for effect in point.effects):
+            found.components.propose_as(self.components)
         return found
 
     @property
