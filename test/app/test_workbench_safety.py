@@ -18,7 +18,8 @@ from ros_processes import executable
 from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
-from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, NotOfferedError, Offered
+from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, Offered
+from pprs_dynamics.app.workbench.ticks import SessionError
 
 AT_ONCE = struct.pack('ii', 1, 0)  # closes with a reset
 SECRET = 'no business of a browser'
@@ -138,7 +139,7 @@ def test_no_path_outside_the_given_folders_is_opened(
     answer = bench.post('/api/open', name=name)
     assert answer.status == 400
     assert SECRET.encode() not in answer.body
-    with pytest.raises(NotOfferedError):
+    with pytest.raises(SessionError):
         Offered.of([str(folder / 'given')]).path(name)
 
 
