@@ -163,6 +163,7 @@ def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
 LESS = {f'effects.load_friction.lift_{k}.coefficient': -0.1 for k in (1, 2, 3)}
 
 
+@pytest.mark.slow
 def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     hidden = {'effects.active': ['load_friction'], **LESS}
     model, recording = synthetic({}, **hidden)

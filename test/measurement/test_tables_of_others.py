@@ -76,8 +76,6 @@ TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
                      {**ALL, 'time_scale': 1e-3}),
     'ISO 8601': ('\n'.join([HEADER, *(','.join([date, *map(repr, row)]) for date, row in zip(
         DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
-    'a blank in the date': ('\n'.join([HEADER, *(','.join([date.replace('T', ' '), *map(
-        repr, row)]) for date, row in zip(DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
     'time alone is called otherwise': (text(WHOLE, header='stamp,' + ','.join(
         f'{joint}/{quantity}' for quantity in ('position', 'effort') for joint in JOINTS) + '\n'),
         {'time': 'stamp'}),

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 from typing import Any
@@ -176,14 +175,3 @@ def test_whatever_a_parameter_is_set_to_gives_a_model_or_one_of_our_errors(
         pass
     else:
         assert forces.total.shape == (1, 6)
-
-
-def test_an_unreadable_file_is_told(tmp_path: Path) -> None:
-    if os.geteuid() == 0:
-        # Permissions do not bind root; a file in place of a folder does.
-        blocked = written(tmp_path, {}) / 'below.yaml'
-    else:
-        blocked = written(tmp_path, {})
-        blocked.chmod(0)
-    with pytest.raises(UnreadableFileError, match=re.escape(str(blocked))):
-        DriveModel.load(blocked)
