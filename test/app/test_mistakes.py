@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +20,7 @@ from made_up_recordings import judged, measured
 from pprs_command import pprs
 
 from pprs_dynamics.app.commands.arguments import number
-from pprs_dynamics.app.commands.pprs import COMMANDS
+from pprs_dynamics.app.commands.pprs import COMMANDS, _module, _parser, main
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import write_recording
 
@@ -136,3 +139,60 @@ def test_numbers_of_the_command_line_are_within_their_bounds() -> None:
     for text in ('0', '-1', '2.1', 'nan', 'inf', '1_0', '', '\uff11'):
         with pytest.raises(argparse.ArgumentTypeError, match='greater than 0 and at most 2 N'):
             read(text)
+
+
+# What `pprs` says to somebody who does not know it: help, what was meant, completion.
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    captured = capsys.readouterr()
+    return ' '.join((captured.out + captured.err).split())
+
+
+def test_alone_it_shows_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    text = said(capsys)
+    assert text.startswith('usage: pprs')
+    assert all(command in text for command in COMMANDS)
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_help_ends_with_an_example_that_the_command_takes(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    example = shlex.split(_module(command).EXAMPLE)
+    assert example[:2] == ['pprs', command]
+    with pytest.raises(SystemExit) as ended:
+        main([command, '--help'])
+    assert ended.value.code == 0
+    assert said(capsys).endswith(f'example: {" ".join(example)}')
+    assert _parser(example[1:]).parse_args(example[1:]).command == command
+
+
+def test_without_a_model_a_recording_of_another_robot_names_init_and_demo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    run = tmp_path / 'run.csv'
+    run.write_text('time,elbow/position,elbow/effort\n0,0,1\n0.01,0,1\n0.02,0,1\n')
+    assert main(['compare', str(run)]) == 2
+    text = said(capsys)
+    assert 'no --model is given' in text
+    assert '`pprs init ' in text
+    assert '--demo' in text
+
+
+@pytest.mark.parametrize(('line', 'word'), [
+    ('pprs comp', 'compare'), ('pprs compare --rep', '--report'), ('pprs adopt strib', 'stribeck'),
+    ('pprs simulate --effect payload_m', 'payload_mass')])
+def test_a_shell_completes_commands_options_and_effects(
+    line: str, word: str, tmp_path: Path,
+) -> None:
+    # As the function does that register-python-argcomplete gives to bash, zsh and fish.
+    pytest.importorskip('argcomplete')
+    done = subprocess.run(
+        [sys.executable, '-m', 'pprs_dynamics.app.commands.pprs'], check=False, timeout=60,
+        env={**os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
+             '_ARGCOMPLETE_STDOUT_FILENAME': str(tmp_path / 'found')})
+    assert done.returncode == 0
+    assert word in (tmp_path / 'found').read_text()

@@ -65,22 +65,3 @@ def test_friction_of_one_passive_joint_is_named_and_adopted(tmp_path: Path) -> N
     assert list(block['joint_friction']) == [joint]
     assert main(['compare', str(run), '--model', str(model), '--json', str(answer)]) == 0
     assert json.loads(answer.read_text())['overall']['rms'] < 0.2
-
-
-def test_a_payload_is_found_with_its_centre(tmp_path: Path) -> None:
-    run = simulated(tmp_path, 'payload_mass', seed=2)
-    answer = tmp_path / 'why.json'
-    assert main(['diagnose', str(run), '--model', HEXAPOD, '--json', str(answer)]) == 0
-    found = json.loads(answer.read_text())['effects'][0]
-    assert found['name'] == 'payload_mass'
-    hidden = truth(tmp_path)[0]['parameters']['mass']
-    assert found['parameters']['mass']['value'] == pytest.approx(hidden, rel=0.03)
-    assert found['parameters']['z']['value'] == pytest.approx(0.05, abs=0.01)
-
-
-@pytest.mark.parametrize('model', [HEXAPOD, 'config/delta.yaml'])
-def test_nothing_hidden_is_adequate(tmp_path: Path, model: str) -> None:
-    run = simulated(tmp_path, model=model, seed=1)
-    answer = tmp_path / 'why.json'
-    assert main(['diagnose', str(run), '--model', model, '--json', str(answer)]) == 0
-    assert json.loads(answer.read_text())['verdict'] == 'adequate'

@@ -82,7 +82,8 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     assert math.isnan(session.errors()['lift_2'].noise)
 
 
-@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',)])
+@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), pytest.param(
+    ('time_delay',), marks=pytest.mark.slow)])
 def test_errors_that_are_shown_are_those_of_compare_after_export(
     session: Session, recording: Path, tmp_path: Path, ticks: tuple[str, ...],
 ) -> None:

@@ -77,9 +77,7 @@ def error_on(model: Path, recording: Recording) -> float:
     return float(np.sqrt(np.nanmean(error ** 2)))
 
 
-def test_the_effect_is_added_and_the_error_falls_on_data_that_was_not_fitted(
-    files: Files,
-) -> None:
+def test_the_effect_is_added_and_the_error_falls_on_data_that_was_not_fitted(files: Files) -> None:
     answer = files.answer
     assert answer['adopted'] is True
     assert answer['held_out_after'] < 0.5 * answer['held_out_before']
@@ -163,6 +161,7 @@ def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
 LESS = {f'effects.load_friction.lift_{k}.coefficient': -0.1 for k in (1, 2, 3)}
 
 
+@pytest.mark.slow
 def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     hidden = {'effects.active': ['load_friction'], **LESS}
     model, recording = synthetic({}, **hidden)

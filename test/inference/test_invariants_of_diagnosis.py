@@ -141,8 +141,9 @@ def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -
         assert effect.evidence == pytest.approx(without - table.best.cost, abs=1e-6)
 
 
-@pytest.mark.parametrize('name', HIDDEN)
-@pytest.mark.parametrize(('s', 'k'), [(1.0, 1e3), (5.0, 100.0)], ids=['mN', 'large'])
+@pytest.mark.parametrize(('name', 's', 'k'), [*((name, 1.0, 1e3) for name in HIDDEN), *(
+    pytest.param(name, 5.0, 100.0, marks=[pytest.mark.slow] * (name not in ('dry', 'delay', 'two')))
+    for name in HIDDEN)])
 def test_the_answer_does_not_depend_on_units_size_or_the_origin_of_time(
     name: str, s: float, k: float,
 ) -> None:

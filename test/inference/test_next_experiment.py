@@ -5,18 +5,20 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
+import made_up_arm as arm
 import numpy as np
+import pandas as pd
 import pytest
-from model_recordings import record
+from model_recordings import record, with_effects
 
-from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.experiments.information import (
-    FittedTerm,
-    Information,
-    whitened,
-)
+from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.experiments.information import FittedTerm, Information, whitened
 from pprs_dynamics.inference.experiments.motion_design import (
     MotionLimits,
     Motions,
@@ -24,7 +26,11 @@ from pprs_dynamics.inference.experiments.motion_design import (
     platform_motion,
 )
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
-from pprs_dynamics.inference.experiments.next_experiment import PurposeError, next_experiment
+from pprs_dynamics.inference.experiments.next_experiment import (
+    COMMISSION,
+    PurposeError,
+    next_experiment,
+)
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
@@ -34,9 +40,11 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
@@ -92,24 +100,18 @@ TERMS = (
     FittedTerm(CATALOGUE['time_delay'], 4, {'delay': 0.004}, (), np.ones(1)),
     FittedTerm(CATALOGUE['homing_error'], 1, {}, ('zero',), np.array([0.001])),
     FittedTerm(CATALOGUE['base_tilt'], None, {}, ('x', 'y'), np.array([0.01, 0.0])))
-EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_mass',
-                              'time_delay'],
-           'effects.time_delay.lift_3.delay': 0.003,
-           'effects.viscous_friction.lift_2.coefficient': 1.5,
-           'effects.stribeck_friction.slide_2.force': 0.6,
-           'effects.stribeck_friction.slide_2.velocity': 0.02,
-           'effects.payload_mass.mass': 0.1,
-           'uncertainties.time_delay.lift_3.delay': 0.001,
-           'uncertainties.viscous_friction.lift_2.coefficient': 1.0,
-           'uncertainties.stribeck_friction.slide_2.force': 1.0,
-           'uncertainties.stribeck_friction.slide_2.velocity': 0.01,
-           'uncertainties.payload_mass.mass': 0.1}
+EFFECTS = {'viscous_friction': {'lift_2.coefficient': 1.5},
+           'stribeck_friction': {'slide_2.force': 0.6, 'slide_2.velocity': 0.02},
+           'payload_mass': {'mass': 0.1}, 'time_delay': {'lift_3.delay': 0.003}}
+KNOWN = {'viscous_friction': {'lift_2.coefficient': 1.0},
+         'stribeck_friction': {'slide_2.force': 1.0, 'slide_2.velocity': 0.01},
+         'payload_mass': {'mass': 0.1}, 'time_delay': {'lift_3.delay': 0.001}}
 
 
 @pytest.fixture(scope='module')
 def design(model: DriveModel, series: JointSeries) -> Design:
     """Columns on a recording of a robot that has effects already."""
-    model = DriveModel.from_parameters({**model.values, **EFFECTS})
+    model = with_effects(model, EFFECTS, KNOWN)
     motion = platform_motion(series, np.arange(0.0, DURATION, 0.002))
     return Design.of(model, [record(model, motion=lambda _: motion, time=motion.time)])
 
@@ -187,3 +189,99 @@ def test_no_room_is_said(model: DriveModel) -> None:
 def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
     with pytest.raises(PurposeError, match='no recording is given'):
         next_experiment(model)
+
+
+# Motions that excite an arm: within its limits, at rest at both ends, and worth their time.
+
+ARM_DURATION = 12.0
+CORNER = 0.03  # share of a period in which the speed changes
+NOISE = 1.5  # [N m, N], white: so much that the corners do not tell
+
+
+@pytest.fixture(scope='module')
+def arm_model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
+    return arm.real_arm(tmp_path_factory.mktemp('arm'))
+
+
+@pytest.fixture(scope='module')
+def found(arm_model: DriveModel):
+    return next_experiment(arm_model, (), COMMISSION, duration=ARM_DURATION, seed=1)
+
+
+def test_it_keeps_the_limits_with_their_margin(arm_model: DriveModel, found) -> None:
+    motion = found.motion(np.linspace(0, ARM_DURATION, 5001))
+    tree = arm_model.robot.structure
+    assert np.all(np.abs(motion.position) <= 0.901 * np.minimum(tree.upper, np.pi))
+    assert np.all(np.abs(motion.velocity) <= 0.901 * tree.speed)
+    assert np.all(np.abs(motion.acceleration) <= 0.901 * 5.0)
+    assert np.all(np.abs(arm_model.drive_forces(motion).total) <= 0.91 * tree.effort)
+    assert max(found.limits.values()) <= 1.001
+
+
+def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:
+    path = str(arm.write_arm(tmp_path))
+    output, answer = str(tmp_path / 'next.csv'), tmp_path / 'next.json'
+    assert main(['next-experiment', '--model', path, '--purpose', 'commission', '--output', output,
+                 '--json', str(answer)]) == 0
+    table = pd.read_csv(output)
+    assert len(table) == 2001
+    assert {f'{joint}/{name}' for joint in arm.JOINTS
+            for name in ('position', 'velocity', 'acceleration')} < set(table.columns)
+    told = json.loads(answer.read_text())
+    assert 0 < told['determined'] <= told['total']
+
+
+@pytest.fixture(scope='module')
+def one_speed(arm_model: DriveModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording in which swing hardly changes its speed: what lacks there is open."""
+    folder = tmp_path_factory.mktemp('one_speed')
+    period, rate = 8.0, 100.0
+    time = np.arange(0, 40, 1 / rate)
+    phase = (time / period) % 1
+    # There and back at constant speed, with rounded corners: viscous friction looks like dry.
+    corner = CORNER
+    speed = np.tanh((np.minimum(phase, 1 - phase)) / (corner / 3)) * np.tanh(
+        (0.5 - phase) / (corner / 3))
+    q = np.zeros((3, len(time), 3))
+    for joint, size in enumerate((0.3, 0.3, 0.05)):
+        v = size * speed
+        q[0, :, joint] = np.concatenate(([0.0], np.cumsum((v[1:] + v[:-1]) / 2 / rate)))
+        q[1, :, joint], q[2, :, joint] = v, np.gradient(v, 1 / rate)
+    viscous = list(arm_model.values['friction.viscous'])
+    viscous[1] += 6.0
+    real = DriveModel.from_parameters(
+        {**arm_model.values, 'friction.viscous': tuple(viscous)}, arm_model.source)
+    path = folder / 'run.csv'
+    write_recording(path, arm.record(real, JointMotion(*q, time), NOISE))
+    return path
+
+
+def test_a_motion_is_designed_that_tells_rivals_apart(
+    arm_model: DriveModel, one_speed: Path, tmp_path: Path,
+) -> None:
+    path, answer = tmp_path / 'arm.yaml', tmp_path / 'next.json'
+    write_model(path, arm_model.values, arm_model.source)
+    output, page = tmp_path / 'next.csv', tmp_path / 'next.html'
+    assert main(['next-experiment', str(one_speed), '--model', str(path), '--output', str(output),
+                 '--json', str(answer), '--report', str(page)]) == 0
+    told = json.loads(answer.read_text())
+    assert told['question'] == 'separate'
+    asked = {frozenset(pair) for pair in told['separates'] + told['does_not_separate']}
+    assert any('viscous_friction' in pair for pair in asked)
+    assert told['separates']
+    assert told['expected_evidence'] > 20
+    assert max(told['limits'].values()) <= 1.001
+    assert 'N m' in page.read_text()
+    # The promise is kept: the rival falls behind in a diagnosis of both runs.
+    table = pd.read_csv(output)
+    moved = JointMotion(*(table[[f'{joint}/{name}' for joint in arm.JOINTS]].to_numpy()
+                          for name in ('position', 'velocity', 'acceleration')),
+                        table['time'].to_numpy())
+    real = DriveModel.from_parameters({**arm_model.values, 'friction.viscous': tuple(
+        np.add(arm_model.values['friction.viscous'], (0, 6.0, 0)))}, arm_model.source)
+    second = tmp_path / 'second.csv'
+    write_recording(second, arm.record(real, moved, NOISE, seed=1))
+    found = diagnose(arm_model, [read_recording(one_speed, arm_model.drives),
+                             read_recording(second, arm_model.drives)])
+    assert [one.name for one in found.effects] == ['viscous_friction']
+    assert found.indistinguishable == ()

@@ -76,8 +76,6 @@ TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
                      {**ALL, 'time_scale': 1e-3}),
     'ISO 8601': ('\n'.join([HEADER, *(','.join([date, *map(repr, row)]) for date, row in zip(
         DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
-    'a blank in the date': ('\n'.join([HEADER, *(','.join([date.replace('T', ' '), *map(
-        repr, row)]) for date, row in zip(DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
     'time alone is called otherwise': (text(WHOLE, header='stamp,' + ','.join(
         f'{joint}/{quantity}' for quantity in ('position', 'effort') for joint in JOINTS) + '\n'),
         {'time': 'stamp'}),
@@ -85,9 +83,7 @@ TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize(('content', 'keys'), TEXTS.values(), ids=TEXTS)
-def test_a_csv_of_any_program_is_read(
-    content: str, keys: dict[str, Any], tmp_path: Path,
-) -> None:
+def test_a_csv_of_any_program_is_read(content: str, keys: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / 'run.csv').write_text(content)
     assert_read(read(tmp_path / 'run.csv', keys), 1e-6 if keys.get('time') == 't' else 1e-9)
 

@@ -7,14 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
-from oracles.first_principles import (
-    UP,
-    central_difference,
-    chain_vectors,
-    drive_motion,
-    moved,
-)
+from oracles.first_principles import UP, central_difference, chain_vectors, drive_motion, moved
 from random_states import (
     ELBOWS,
     OPEN_LIMITS,
@@ -223,25 +218,17 @@ def test_independent_chains_refuse_where_a_rod_is_upright(elbow, equations, cosi
     assert np.all(np.isfinite(whole.drive_forces(pose).total))
 
 
-# The sum over effects ------------------------------------------------------------------------
-
-
-def effect_keys(name, drives, values):
-    """Return the keys that activate one effect on drives."""
-    return {'effects.active': [name],
-            **{f'effects.{name}.{drive}.{key}': value
-               for drive in drives for key, value in values.items()}}
-
-
 # Effects with memory -------------------------------------------------------------------------
 
-HYSTERESIS = effect_keys('hysteresis', ('slide_1', 'lift_2'), {'force': 0.8, 'distance': 0.01})
 
 
 @pytest.fixture
 def remembering():
     """Return a model with hysteresis, and a motion with reversals."""
-    return (paper_model({**OPEN_LIMITS, **HYSTERESIS}), smooth_motion(np.linspace(0, 4, 800)))
+    model = with_effects(paper_model(OPEN_LIMITS), {'hysteresis': {
+        f'{drive}.{key}': value for drive in ('slide_1', 'lift_2')
+        for key, value in (('force', 0.8), ('distance', 0.01))}})
+    return model, smooth_motion(np.linspace(0, 4, 800))
 
 
 def test_a_copied_state_does_not_advance_the_original(remembering):

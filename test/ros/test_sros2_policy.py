@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -66,9 +64,6 @@ def started(running: Bench) -> Iterator[Node]:
     factories: list[tuple[Callable[..., Node], dict[str, Any]]] = [
         (FeedforwardNode, {'use_sim_time': True}), (MonitorNode, {'diagnose_every': 60.0}),
         (PlayTrajectoryNode, {}), (SimulatedRobotNode, {})]
-    if importlib.util.find_spec('control_msgs'):
-        proxy = importlib.import_module('pprs_dynamics.ros.trajectory_proxy')
-        factories.append((proxy.TrajectoryProxyNode, {}))
     for factory, more in factories:
         yield running.add(factory, parameter_overrides=overrides(**more))
     workbench = LiveJointStates(DriveModel.load(), 'joint_states', 'monitor', 'feedforward',

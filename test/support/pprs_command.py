@@ -5,7 +5,7 @@
 
 Starting Python and importing NumPy, SciPy and rich again takes longer than most commands run. What
 a process alone shows (streams that close, signals, the environment, the installed script) is in
-test_terminal.py, test_files_of_commands.py and test_help.py, which start one.
+test_terminal.py, test_files_of_commands.py and test_mistakes.py, which start one.
 """
 
 from __future__ import annotations

@@ -238,11 +238,6 @@ class Regression:
         self._equations[key] = found
         return found
 
-    def release(self) -> None:
-        """Forget equations and products, which are computed again where a fit needs them."""
-        self._equations.clear()
-        self._products.clear()
-
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks with the base columns and the noise.
 

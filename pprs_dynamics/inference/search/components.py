@@ -109,9 +109,7 @@ class DriveComponents:
 
     def rows_of(self, effect: type[DriveEffect]) -> Array:
         """Return what an effect does in all shapes tried, (k, n), transformed."""
-        if 'score_test' in vars(self):
-            return self.score_test.rows[self.d][self._places[effect]]
-        return self._tried(effect)[1]
+        return self.score_test.rows[self.d][self._places[effect]]
 
     def _tried(self, effect: type[DriveEffect]) -> tuple[list[tuple[Term, int, int]], Array]:
         """Return an effect's terms, each with its rows known and its first row, and all rows."""
@@ -412,10 +410,3 @@ class Components:
             for d, row in self.design.known_change(term).items():
                 force[:, d] += row
         return force
-
-    def release(self) -> None:
-        """Let go of products that only further scans would need."""
-        both: tuple[Components | DriveComponents, ...] = (self, *self.local.values())
-        for one in both:
-            if 'score_test' in vars(one):
-                one.score_test = one.score_test.around(one.regression)

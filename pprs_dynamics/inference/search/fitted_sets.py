@@ -160,11 +160,6 @@ class FittedSets:
             fitted = less
         return fitted
 
-    def release(self) -> None:
-        """Let go of what only further scans and fits would need."""
-        self.components.release()
-        self.regression.release()
-
     def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
                ) -> list[Block]:
         """Return the columns of candidates, then those of what they leave open."""

@@ -86,12 +86,6 @@ class Search:
             self.fits.stepped = lambda: None
             self._report(1.0)
 
-    def release(self) -> None:
-        """Let go of what only further scans and fits would need."""
-        self.fits.release()
-        for patterns in self.patterns:
-            patterns.release()
-
     def _stepped(self) -> None:
         """Report progress: how much is to be done nobody knows, but it never stands still."""
         self._steps += 1

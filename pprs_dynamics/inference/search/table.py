@@ -313,7 +313,6 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
             first.evaluate(best.fitted.candidates).total - best.fitted.total) > LEAST_CHANGE:
         point = best.fits.design.point
         patterns = search.patterns
-        search.release()
         fits = first if point is None else first.around(point)
         search = Search(fits, [pattern.around(fits.regression) for pattern in patterns],
                         lambda share: report(0.6 + 0.3 * share))

@@ -157,10 +157,6 @@ class DrivePatterns:
         return [Columns(self.regression, {self.d: transformed.rows})
                 for transformed in self._transformed]
 
-    def release(self) -> None:
-        """Let go of products that only further scans would need."""
-        vars(self).pop('_columns', None)
-
     @property
     def families(self) -> list[Family]:
         """All families that are searched."""

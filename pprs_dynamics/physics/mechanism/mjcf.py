@@ -63,7 +63,7 @@ def read_mjcf(path: str) -> Description:
 
 
 def readable_spec(mujoco: Any, path: str) -> Any:
-    """Return MuJoCo's specification of an MJCF, which compiles.
+    """Return MuJoCo's specification of an MJCF, which compiles; all bodies and joints have names.
 
     Files of meshes may be missing if no mass follows from them.
 
@@ -73,14 +73,14 @@ def readable_spec(mujoco: Any, path: str) -> Any:
         If it cannot be compiled.
     """
     try:
-        spec = mujoco.MjSpec.from_file(path)
+        spec = _named(mujoco.MjSpec.from_file(path))
         spec.compile()
         return spec
     except (ValueError, mujoco.FatalError) as error:
         reason = f'not MJCF that can be compiled: {" ".join(str(error).split())}'
     weighed: list[str] = []
     try:
-        spec = mujoco.MjSpec.from_file(path)
+        spec = _named(mujoco.MjSpec.from_file(path))
         weighed = _without_shapes(mujoco, spec)
         spec.compile()
         return spec
@@ -90,6 +90,13 @@ def readable_spec(mujoco: Any, path: str) -> Any:
         reason += (f'; {", ".join(weighed)} have no <inertial>, so their mass follows from their '
                    'shapes: bring the file, or write <inertial>')
     raise UnreadableFileError(path, reason)
+
+
+def _named(spec: Any) -> Any:
+    for kind, parts in (('body', spec.bodies), ('joint', spec.joints)):
+        for number, part in enumerate(parts):
+            part.name = part.name or f'{kind}_{number}'
+    return spec
 
 
 def _without_shapes(mujoco: Any, spec: Any) -> list[str]:
@@ -121,8 +128,8 @@ class _Reader:
         mujoco.mj_kinematics(model, data)
         self.placed = [Frame(data.xmat[b].reshape(3, 3).copy(), data.xpos[b].copy())
                        for b in range(model.nbody)]
-        self.bodies = [WORLD] + [model.body(b).name or f'body_{b}' for b in range(1, model.nbody)]
-        self.names = [model.joint(k).name or f'joint_{k}' for k in range(model.njnt)]
+        self.bodies = [WORLD] + [model.body(b).name for b in range(1, model.nbody)]
+        self.names = [model.joint(k).name for k in range(model.njnt)]
 
     def description(self, digest: str) -> Description:
         """Return the description."""

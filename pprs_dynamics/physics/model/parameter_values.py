@@ -76,9 +76,9 @@ def added_effects(
     blocks = blocks_below({key: value for key, value in parameters.items() if key not in LISTS},
                           'effects.')
     for name, values in blocks.items():
-        if values.pop('', None) not in (None, {}):
-            raise ModelError(f'effects.{name}', parameters[f'effects.{name}'],
-                             'be a mapping of its parameters')
+        # Of a key that ends with the name, or with a dot behind it.
+        if (value := values.pop('', None)) not in (None, {}):
+            raise ModelError(f'effects.{name}', value, 'be a mapping of its parameters')
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
