@@ -75,9 +75,7 @@ def test_colcon_test_runs_the_tests_that_need_no_more_than_package_xml_names(
 
 
 @pytest.mark.parametrize('symlink', [False, True], ids=['copied', 'symlinked'])
-def test_the_built_workspace_runs_the_node(
-    tmp_path: Path, ros_domain: int, symlink: bool,
-) -> None:
+def test_the_built_workspace_runs_the_node(tmp_path: Path, ros_domain: int, symlink: bool) -> None:
     copy_source(tmp_path, PACKAGED)
     clean = colcon_environment(ros_domain)
     colcon(['build', *(['--symlink-install'] if symlink else [])], tmp_path, clean)

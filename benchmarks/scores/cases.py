@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import OUTPUT
-from pprs_dynamics.app.fleet.engine import cluster, run_each
+from pprs_dynamics.app.commands.survey import cluster, run_each
 
 Outcome = dict[str, Any]
 # Takes work and items; yields item, result and what went wrong, as they come.

@@ -218,9 +218,7 @@ def test_what_is_commented_out_of_a_description_is_no_xacro(robot: Path) -> None
         first_model(robot)
 
 
-def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(
-    tmp_path: Path,
-) -> None:
+def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(tmp_path: Path) -> None:
     # A lift that was not recorded, then arm_1, arm_2, arm_3 that were, all but in order.
     joints = ('lift', 'arm_1_joint', 'arm_2_joint', 'arm_3_joint')
     text = ''.join(f'<link name="l{k}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" '

@@ -17,7 +17,7 @@ import pandas
 import pytest
 
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.app.fleet.engine import cluster, run_each
+from pprs_dynamics.app.commands.survey import cluster, run_each
 from pprs_dynamics.app.fleet.recordings import (
     COLUMNS,
     ManifestError,

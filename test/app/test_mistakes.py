@@ -56,7 +56,7 @@ MISTAKES = {
     'next-experiment --output x.csv': 'no recording is given',
     'next-experiment --purpose commission --output none/x.csv': 'none/x.csv',
     'reproduce': '--output',
-    'reproduce --output /dev/null/below': '/dev/null/below: cannot be a folder',
+    'reproduce --output /dev/null/below': '/dev/null/below: Not a directory',
     'reproduce --output x --model axis.yaml': 'must be a 3-PPRS',
     'simulate --output x.csv --noise -1': 'argument --noise: ',
     'simulate --output x.csv --seed 1.5': "'1.5' must be a whole number",

@@ -18,7 +18,8 @@ from ros_processes import executable
 from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
-from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, NotOfferedError, Offered
+from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, Offered
+from pprs_dynamics.app.workbench.ticks import SessionError
 
 AT_ONCE = struct.pack('ii', 1, 0)  # closes with a reset
 SECRET = 'no business of a browser'
@@ -112,9 +113,7 @@ def test_a_change_says_where_it_comes_from_and_is_json(bench: Workbench) -> None
     assert bench.screen()['revision'] == before
 
 
-def test_answers_run_and_load_nothing_from_elsewhere_and_cannot_be_framed(
-    bench: Workbench,
-) -> None:
+def test_answers_run_and_load_nothing_from_elsewhere_and_cannot_be_framed(bench: Workbench) -> None:
     for path, cookie in (('/', None), ('/api/screen', None), ('/', 'a=b'), ('/nothing', None)):
         headers = bench.send('GET', path, cookie=cookie).headers
         policy = headers['Content-Security-Policy']
@@ -138,7 +137,7 @@ def test_no_path_outside_the_given_folders_is_opened(
     answer = bench.post('/api/open', name=name)
     assert answer.status == 400
     assert SECRET.encode() not in answer.body
-    with pytest.raises(NotOfferedError):
+    with pytest.raises(SessionError):
         Offered.of([str(folder / 'given')]).path(name)
 
 
@@ -161,9 +160,7 @@ def upload(bench: Workbench, body: bytes, name: str = 'a.csv', **headers: str) -
                       **headers).status
 
 
-def test_uploads_are_bounded_and_read_by_the_strict_readers(
-    bench: Workbench, folder: Path,
-) -> None:
+def test_uploads_are_bounded_and_read_by_the_strict_readers(bench: Workbench, folder: Path) -> None:
     before = len(bench.screen()['recordings'])
     assert upload(bench, b'', Content_Length=str(10**12)) == 413
     assert upload(bench, b'time,\n1,2\n') == 400

@@ -77,9 +77,7 @@ def error_on(model: Path, recording: Recording) -> float:
     return float(np.sqrt(np.nanmean(error ** 2)))
 
 
-def test_the_effect_is_added_and_the_error_falls_on_data_that_was_not_fitted(
-    files: Files,
-) -> None:
+def test_the_effect_is_added_and_the_error_falls_on_data_that_was_not_fitted(files: Files) -> None:
     answer = files.answer
     assert answer['adopted'] is True
     assert answer['held_out_after'] < 0.5 * answer['held_out_before']

@@ -32,9 +32,7 @@ def recorded(seed: int, correlation: float) -> tuple[Recording, np.ndarray]:
 
 
 @pytest.mark.parametrize('correlation', [0.0, 0.97])
-def test_a_perfect_model_leaves_the_noise_treated_the_same_way(
-    correlation: float,
-) -> None:
+def test_a_perfect_model_leaves_the_noise_treated_the_same_way(correlation: float) -> None:
     recording, noise = recorded(21, correlation)
     residuals, _ = measure_residuals(DriveModel.load(), [recording])
     reconstruction = reconstruct(DriveModel.load(), recording)

@@ -18,11 +18,7 @@ from model_recordings import record, with_effects
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.information import (
-    FittedTerm,
-    Information,
-    whitened,
-)
+from pprs_dynamics.inference.experiments.information import FittedTerm, Information, whitened
 from pprs_dynamics.inference.experiments.motion_design import (
     MotionLimits,
     Motions,

@@ -59,9 +59,7 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[DriveModel, Refer
     return model, Reference.of(model, [run(model, 0, 1)])
 
 
-def test_what_was_in_the_reference_has_not_changed(
-    machine: tuple[DriveModel, Reference],
-) -> None:
+def test_what_was_in_the_reference_has_not_changed(machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     again = run(model, 0, 2)
     found = pprs.diagnose(model, again, reference=run(model, 0, 1))

@@ -92,9 +92,7 @@ def in_one_line(text: str) -> str:
 
 @pytest.mark.parametrize('width', [80])
 @pytest.mark.parametrize('make', [ambiguous, everything])
-def test_with_details_the_terminal_shows_everything_within_its_width(
-    make: Any, width: int,
-) -> None:
+def test_with_details_the_terminal_shows_everything_within_its_width(make: Any, width: int) -> None:
     diagnosis = make()
     words = word_diagnosis(diagnosis)
     text = printed(diagnosis, width, details=True)

@@ -215,9 +215,7 @@ def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize('offset', [None, 0.02, 0.5])
-def test_two_publishers_on_one_topic_are_no_recording(
-    offset: float | None, tmp_path: Path,
-) -> None:
+def test_two_publishers_on_one_topic_are_no_recording(offset: float | None, tmp_path: Path) -> None:
     arrays = measured(200)
     other = measured(200, seed=1)['position'] + offset if offset else np.zeros((200, len(DRIVES)))
     mixed = [state for pair in zip(states_of(arrays), states_of(

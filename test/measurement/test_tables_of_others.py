@@ -83,9 +83,7 @@ TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize(('content', 'keys'), TEXTS.values(), ids=TEXTS)
-def test_a_csv_of_any_program_is_read(
-    content: str, keys: dict[str, Any], tmp_path: Path,
-) -> None:
+def test_a_csv_of_any_program_is_read(content: str, keys: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / 'run.csv').write_text(content)
     assert_read(read(tmp_path / 'run.csv', keys), 1e-6 if keys.get('time') == 't' else 1e-9)
 

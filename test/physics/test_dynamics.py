@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
-from oracles.first_principles import (
-    UP,
-    central_difference,
-    chain_vectors,
-    drive_motion,
-    moved,
-)
+from oracles.first_principles import UP, central_difference, chain_vectors, drive_motion, moved
 from random_states import (
     ELBOWS,
     OPEN_LIMITS,

@@ -24,12 +24,7 @@ from scipy.optimize import brentq, root
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
-from pprs_dynamics.errors import (
-    ConvergenceError,
-    MotionError,
-    SingularityError,
-    WorkspaceError,
-)
+from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 POSES = 4000

@@ -148,8 +148,9 @@ def test_a_key_given_nested_and_with_dots_is_refused(tmp_path: Path) -> None:
 
 def test_an_effect_cannot_be_a_value_and_a_block_at_once() -> None:
     values = {**DriveModel.load().values, 'effects.effort_offset.lift_1.force': 1.0}
-    with pytest.raises(ModelError, match='be a mapping of its parameters'):
-        DriveModel.from_parameters({**values, 'effects.effort_offset': 3})
+    for key in ('effects.effort_offset', 'effects.effort_offset.'):
+        with pytest.raises(ModelError, match='be a mapping of its parameters'):
+            DriveModel.from_parameters({**values, key: 3})
 
 
 JUNK = st.one_of(

@@ -43,7 +43,7 @@ def motions() -> dict[str, PlatformMotion]:
 
 
 @pytest.mark.parametrize('name', motions())
-def test_twists_are_the_poses_derivatives_in_base(name: str) -> None:
+def test_twists_and_accelerations_are_derivatives_in_base(name: str) -> None:
     motion = motions()[name]
     before, middle, after = (motion[k::3] for k in range(3))
     velocity = (after.position - before.position) / (2 * STEP)
@@ -51,12 +51,6 @@ def test_twists_are_the_poses_derivatives_in_base(name: str) -> None:
     turned = Rotation.from_quat(after.orientation) * Rotation.from_quat(before.orientation).inv()
     np.testing.assert_allclose(middle.angular_velocity, turned.as_rotvec() / (2 * STEP),
                                rtol=0, atol=RATE_TOLERANCE)
-
-
-@pytest.mark.parametrize('name', motions())
-def test_accelerations_are_the_twists_derivatives_in_base(name: str) -> None:
-    motion = motions()[name]
-    before, middle, after = (motion[k::3] for k in range(3))
     for rate, gain in (('linear_velocity', 'linear_acceleration'),
                        ('angular_velocity', 'angular_acceleration')):
         difference = (getattr(after, rate) - getattr(before, rate)) / (2 * STEP)

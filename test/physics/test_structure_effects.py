@@ -12,14 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from oracles.mujoco_robot import MujocoRobot
-from random_states import (
-    ELBOWS,
-    model_of,
-    paper_model,
-    random_motion,
-    random_poses,
-    random_robot,
-)
+from random_states import ELBOWS, model_of, paper_model, random_motion, random_poses, random_robot
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ModelError

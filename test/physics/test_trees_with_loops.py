@@ -467,9 +467,7 @@ def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: DriveModel)
     assert np.abs(on_crank - robot.torques(q, v, a)).max() > 0.1
 
 
-def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
-    parallelogram: DriveModel,
-) -> None:
+def test_friction_that_turns_with_a_drive_is_left_to_the_drive(parallelogram: DriveModel) -> None:
     groups = proportional_joints(parallelogram.robot.structure)
     assert groups == (('crank_pin', 'knee', 'ankle'), ('pivot',))
     offered = {names[0] for names in parallelogram.bound(JointFrictionEffect).variants}

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from failing_effects import FAULTS, LOADED, fail, model_file
+from failing_effects import FAULTS, LOADED, fail, model_file, offer
 from feedforward_bench import random_motion
 from model_recordings import with_effects
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE, GROUP, check_columns, guard
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE, check_columns, guard
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 
 PROJECT = Path(__file__).parents[2]
@@ -122,23 +122,14 @@ BROKEN = {
 }
 
 
-def offer(folder: Path, package: str, source: str, target: str) -> None:
-    """Put a package with one entry point into a folder."""
-    (folder / f'{package}.py').write_text(source)
-    info = folder / f'{package}-1.0.dist-info'
-    info.mkdir()
-    (info / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n')
-    (info / 'entry_points.txt').write_text(
-        f'[{GROUP}]\n{package} = {target.format(module=package)}\n')
-
-
 def test_a_broken_effect_is_left_out_with_one_clear_warning_and_the_others_stay(
     tmp_path: Path,
 ) -> None:
     for package, (source, target, _) in BROKEN.items():
-        offer(tmp_path, f'broken_{package}', source, target)
-    offer(tmp_path, 'a_good_one', GOOD, '{module}:Mine')
-    offer(tmp_path, 'second_of_that_name', GOOD, '{module}:Mine')
+        name = f'broken_{package}'
+        offer(tmp_path, name, source, {name: target.format(module=name)})
+    for package in ('a_good_one', 'second_of_that_name'):
+        offer(tmp_path, package, GOOD, {package: f'{package}:Mine'})
     done = python(LIST, tmp_path)
     assert done.stdout.split() == [*CATALOGUE, 'mine'], done.stderr
     told = [line for line in done.stderr.splitlines() if 'is left out' in line]
@@ -236,9 +227,7 @@ def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(
     assert not np.isfinite(model.drive_forces(absurd).total).all()
 
 
-def test_an_effect_whose_memory_cannot_be_copied_is_told(
-    package: Any, tmp_path: Path,
-) -> None:
+def test_an_effect_whose_memory_cannot_be_copied_is_told(package: Any, tmp_path: Path) -> None:
     package.WornBrake.drive_memory = classmethod(lambda cls: {'samples': 0, 'log': (x for x in ())})
     model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
     with pytest.raises(EffectError, match='effect worn_brake: its memory cannot be copied'):

@@ -76,9 +76,7 @@ def node(file: Path) -> Iterator[FeedforwardBench]:
         yield running
 
 
-def test_efforts_are_the_models_on_every_topic(
-    node: FeedforwardBench, model: DriveModel,
-) -> None:
+def test_efforts_are_the_models_on_every_topic(node: FeedforwardBench, model: DriveModel) -> None:
     moved = motion()
     forces = model.drive_forces(moved)
     parts = {name: node.bench.listen(JointState, f'/feedforward/effort/{name}')

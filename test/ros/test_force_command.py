@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from model_recordings import with_effects
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.force_command import Feedforward, warn_without_limits
@@ -126,13 +126,17 @@ def test_a_piece_of_a_path_comes_to_rest_if_nothing_follows() -> None:
         np.testing.assert_array_equal(given, kept[:-1])
 
 
-def test_a_path_that_ends_at_rest_and_a_time_of_0_get_no_point_more() -> None:
+def test_only_a_path_that_ends_at_rest_and_a_time_of_0_get_no_point_more() -> None:
     node = Feedforward(MODEL, OWN)
     moving = node.answer(request(1.0, 3))
     for at_once in (0.0, 1e-10):  # in less than 1 ns two points would be at one time
         assert len(node.ending_at_rest(moving, at_once).offsets) == 3
-    still = node.answer(TrajectoryRequest(HelicalPath().motion([1.0]).held(), 0, np.array([0])))
-    assert len(node.ending_at_rest(still, 0.1).offsets) == 1
+    still = HelicalPath().motion([1.0]).held()
+    zero = np.zeros((1, 3))
+    falling = PlatformMotion(still.position, still.orientation, zero, zero, zero - 1.0, zero)
+    for motion, points in ((still, 1), (falling, 2)):
+        answer = node.answer(TrajectoryRequest(motion, 0, np.array([0])))
+        assert len(node.ending_at_rest(answer, 0.1).offsets) == points
 
 
 def test_a_stop_never_leads_beyond_a_stroke() -> None:

@@ -65,9 +65,7 @@ def test_a_launch_file_starts_its_nodes_with_parameters_that_they_have(
 
 
 @pytest.mark.parametrize('name', STARTED)
-def test_a_file_that_is_not_there_is_a_sentence(
-    name: str, monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_file_that_is_not_there_is_a_sentence(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(PprsError, match=r'nowhere\.yaml'):
         described(name, monkeypatch, model='nowhere.yaml')
 

@@ -65,6 +65,14 @@ def test_a_message_with_all_drives_is_a_sample_at_once_in_any_order(robot: Robot
     robot.check([0])
 
 
+def test_parts_beside_whole_messages_are_no_samples(robot: Robot) -> None:
+    robot.send(JOINTS, 0)
+    for k in range(1, 5):
+        robot.send(['a', 'b'], k * PERIOD)
+        robot.send(['c'], k * PERIOD)
+    robot.check([0])
+
+
 @pytest.mark.parametrize('late', [0, 700_000, -700_000])
 def test_of_messages_with_some_drives_samples_are_at_the_stamps_of_the_first(
     robot: Robot, late: int,

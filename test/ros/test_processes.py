@@ -77,14 +77,19 @@ MISTAKES = {
 }
 
 
+def refused(domain: int, name: str, *arguments: str) -> str:
+    """Return what an executable prints that does not start."""
+    done = subprocess.run([executable(name), *arguments], env=environment(domain),
+                          capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert 'Traceback' not in done.stderr
+    return done.stderr.strip()
+
+
 @pytest.mark.parametrize('mistake', MISTAKES)
 def test_a_wrong_parameter_is_one_sentence_and_status_2(ros_domain: int, mistake: str) -> None:
     name, parameter = mistake.split(' ')
-    done = subprocess.run([executable(name), '--ros-args', '-p', parameter],
-                          env=environment(ros_domain), capture_output=True, text=True, timeout=20)
-    assert done.returncode == 2
-    assert MISTAKES[mistake] in done.stderr
-    assert 'Traceback' not in done.stderr
+    assert MISTAKES[mistake] in refused(ros_domain, name, '--ros-args', '-p', parameter)
 
 
 def test_a_parameter_file_that_ros_cannot_read_is_one_sentence(
@@ -92,12 +97,9 @@ def test_a_parameter_file_that_ros_cannot_read_is_one_sentence(
 ) -> None:
     file = tmp_path / 'model.yaml'
     file.write_text('/**:\n  ros__parameters:\n    gravity: [0, 0.0, -9.81]\n')
-    done = subprocess.run([executable('feedforward'), '--ros-args', '--params-file', str(file)],
-                          env=environment(ros_domain), capture_output=True, text=True, timeout=20)
-    assert done.returncode == 2
-    assert str(file) in done.stderr
-    assert 'write 0.0, not 0' in done.stderr
-    assert 'Traceback' not in done.stderr
+    said = refused(ros_domain, 'feedforward', '--ros-args', '--params-file', str(file))
+    assert str(file) in said
+    assert 'write 0.0, not 0' in said
 
 
 @pytest.mark.parametrize(('name', 'arguments'), [
@@ -106,11 +108,9 @@ def test_a_parameter_file_that_ros_cannot_read_is_one_sentence(
 def test_what_ros_would_pass_over_is_refused_with_usage(
     ros_domain: int, name: str, arguments: tuple[str, ...],
 ) -> None:
-    done = subprocess.run([executable(name), *arguments], env=environment(ros_domain),
-                          capture_output=True, text=True, timeout=20)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f'usage: {name} [--ros-args')
-    assert f'{arguments[-2:][0]} is outside of --ros-args' in done.stderr
+    said = refused(ros_domain, name, *arguments)
+    assert said.startswith(f'usage: {name} [--ros-args')
+    assert f'{arguments[-2:][0]} is outside of --ros-args' in said
 
 
 def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None:
@@ -131,10 +131,7 @@ def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None
 def test_without_a_model_it_does_not_start_and_says_what_to_write(
     node: str, ros_domain: int,
 ) -> None:
-    done = subprocess.run([executable(node)], env=environment(ros_domain), capture_output=True,
-                          text=True, timeout=60)
-    assert done.returncode == 2
-    said = done.stderr.strip().splitlines()[-1]
+    said = refused(ros_domain, node).splitlines()[-1]
     assert said.startswith(f'{node} was given no model')
     assert '--params-file FILE' in said
     assert 'demo:=true' in said

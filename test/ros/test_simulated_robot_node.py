@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -21,7 +22,9 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
+from pprs_dynamics.simulation.drive_control import Setpoint
 
 pytestmark = pytest.mark.nodes
 
@@ -171,3 +174,13 @@ def test_a_clock_that_is_set_back_does_not_stop_the_robot() -> None:
         stamps = run(3.0, 5.0)
         assert len(stamps) > 200
         assert max(stamps[-100:]) < 5.1e9
+
+
+def test_a_setpoint_replaces_what_waits_for_its_time_or_a_later_one() -> None:
+    control = Mock()
+    queue = SetpointQueue(control)
+    old, new = Setpoint(REST), Setpoint(REST + 0.001)
+    for moment, setpoint in ((1.0, old), (2.0, old), (1.0, new)):
+        queue.add(moment, setpoint)
+    queue.advance(1.5)
+    control.command.assert_called_once_with(1.0, new, taken=1.5)

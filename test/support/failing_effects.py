@@ -115,14 +115,14 @@ EFFECTS = {'worn_brake': 'WornBrake', 'hose': 'Hose'}
 BLOCKS = {'worn_brake': {'slide_2': {'coefficient': 3.0}}, 'hose': {'force': 2.0}}
 
 
-def install(folder: Path) -> Path:
-    """Put the package where `folder` on the path makes it an installed one."""
-    (folder / f'{PACKAGE}.py').write_text(SOURCE)
-    info = folder / f'{PACKAGE}-1.0.dist-info'
+def offer(folder: Path, package: str, source: str, entries: dict[str, str]) -> Path:
+    """Put a package with entry points where `folder` on the path makes it an installed one."""
+    (folder / f'{package}.py').write_text(source)
+    info = folder / f'{package}-1.0.dist-info'
     info.mkdir()
-    (info / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {PACKAGE}\nVersion: 1.0\n')
+    (info / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n')
     (info / 'entry_points.txt').write_text(f'[{GROUP}]\n' + ''.join(
-        f'{name} = {PACKAGE}:{kind}\n' for name, kind in EFFECTS.items()))
+        f'{name} = {target}\n' for name, target in entries.items()))
     return folder
 
 
@@ -154,7 +154,8 @@ def fail(package: Any, place: str, fault: str = 'raises') -> None:
 @contextmanager
 def installed(folder: Path) -> Iterator[ModuleType]:
     """Give the package's module, installed for this process; nothing fails until `fail`."""
-    sys.path.insert(0, str(install(folder)))
+    sys.path.insert(0, str(offer(folder, PACKAGE, SOURCE, {
+        name: f'{PACKAGE}:{kind}' for name, kind in EFFECTS.items()})))
     catalogue.cache_clear()
     try:
         assert set(EFFECTS) <= set(catalogue())

@@ -12,11 +12,7 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnosis import (
-    Diagnosis,
-    FoundEffect,
-    RankedSet,
-)
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RankedSet
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals

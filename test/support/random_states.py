@@ -77,9 +77,7 @@ def random_poses(
     return position, Rotation.from_rotvec(turn).as_quat()
 
 
-def random_motion(
-    rng: np.random.Generator, count: int, elbow: str = 'up',
-) -> PlatformMotion:
+def random_motion(rng: np.random.Generator, count: int, elbow: str = 'up') -> PlatformMotion:
     """Return independent states: pose, twist and acceleration drawn for each sample."""
     position, orientation = random_poses(rng, count, elbow)
     v, omega, a, epsilon = (

@@ -65,9 +65,7 @@ def test_files_out_of_bounds_are_one_sentence_within_a_second(
 
 @pytest.mark.parametrize('number', [
     ':'.join(['59'] * 300) + '.5', '\uff11.5', '1.\uff10e3', '0x' + 'f' * 900, '9' * 900])
-def test_numbers_within_bounds_that_are_none_are_one_sentence(
-    tmp_path: Path, number: str,
-) -> None:
+def test_numbers_within_bounds_that_are_none_are_one_sentence(tmp_path: Path, number: str) -> None:
     file = tmp_path / 'model.yaml'
     file.write_text(PAPER.read_text().replace('base_radius: 0.15', f'base_radius: {number}'))
     done = pprs('history', file.name, cwd=tmp_path)

@@ -199,17 +199,6 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
     return inputs
 
 
-def make_folder(path: str | PathLike[str]) -> Path:
-    """Return the folder, made where it does not exist."""
-    folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UnreadableFileError(folder, f'cannot be a folder for output: {error.strerror}'
-                                  ) from None
-    return folder
-
-
 def write_json(path: str | PathLike[str], content: Any) -> None:
     """Write JSON atomically; see `for_json`."""
     write_text(path, json.dumps(for_json(content), indent=2, ensure_ascii=False) + '\n')

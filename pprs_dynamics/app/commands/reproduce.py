@@ -13,7 +13,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import make_folder, output_folder, write_json
+from pprs_dynamics.app.commands.arguments import output_folder, write_json
 from pprs_dynamics.app.report.pictures import draw_figure_8, draw_figure_9
 from pprs_dynamics.app.report.terminal import console, escape, shown, text_table
 from pprs_dynamics.drives import DRIVES
@@ -42,7 +42,8 @@ def run(options: argparse.Namespace) -> int:
             print(f'pprs reproduce: this robot cannot follow the paper\'s path: {error}',
                   file=sys.stderr)
             return 1
-        folder = make_folder(options.output)
+        folder = Path(options.output)
+        folder.mkdir(parents=True, exist_ok=True)
         written = [draw_figure_8(folder / 'figure_8.png', result),
                    draw_figure_9(folder / 'figure_9.png', result),
                    _write_curves(folder / 'forces.csv', result)]

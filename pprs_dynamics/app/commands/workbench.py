@@ -55,8 +55,8 @@ def run(options: argparse.Namespace) -> int:
     inputs = Inputs.read(
         options.model, given, options.validate, options.topic).since(options.reference)
     live = _live(options, inputs.model) if options.live else None
-    hub = Hub(inputs, Offered.of(options.recordings), live)
-    serve(hub, options.host, options.port, not options.no_browser)
+    serve(Hub(inputs, Offered.of(options.recordings), live), options.host, options.port,
+          not options.no_browser)
     return 0
 
 

@@ -13,7 +13,7 @@ from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.jobs import Jobs
 from pprs_dynamics.app.workbench.masks import shares_in, span_mask
-from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
+from pprs_dynamics.app.workbench.ticks import Ticks
 from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
@@ -54,9 +54,7 @@ class Session:
 
     def __init__(self, model: DriveModel, recordings: Mapping[str, Recording],
                  inputs: Inputs | None = None) -> None:
-        if not recordings:
-            raise SessionError('no recording is given, must be at least one')
-        self.ticks = Ticks(model, inputs or Inputs(model, recordings, {}))
+        self.ticks = Ticks(model, (inputs or Inputs(model, recordings, {})).require_recordings())
         self.jobs = Jobs(self.ticks)
 
     @classmethod

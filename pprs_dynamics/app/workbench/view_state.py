@@ -9,7 +9,7 @@ Linear at once, then noise, shapes and the exact model.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,7 @@ class DriveError:
 
     def to_dict(self) -> dict[str, float | None]:
         """Return it for JSON."""
-        return {'before': finite(self.before), 'now': finite(self.now),
-                'noise': finite(self.noise)}
+        return {name: finite(value) for name, value in vars(self).items()}
 
 
 @dataclass(frozen=True)
@@ -209,7 +208,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
-    card, drives = effect.card, model.drives
+    drives = model.drives
     tick = view.ticks.get(effect.name)
     offer = next((offer for offer in view.offers if offer.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
@@ -224,8 +223,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
         'nonlinear': effect.nonlinear,
         'is_called_for': called_for is not None and effect.name in called_for,
         'is_judged': called_for is not None,
-        'equation': card.equation, 'looks_like': card.looks_like,
-        'causes': card.causes, 'confirm': card.confirm,
+        **asdict(effect.card),
         'parameters': _parameters(view, effect, model) if tick else []}
 
 

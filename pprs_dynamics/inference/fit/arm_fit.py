@@ -122,7 +122,7 @@ def fit_arm(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     fitted = _with(model, bodies + (directions[:links, :links] @ c[:links]).reshape(bodies.shape),
                    np.maximum(start + spread * c[places], [0.0, 0.0, -np.inf, 0.0]), width)
     return fitted, _numbers(model, fitted, dict(zip(OWN, std.T, strict=True))), _notes(
-        model, fitted, fit.covariance[:links, :links], directions[:links:PARAMETERS, :links],
+        model, fitted, possible.covariance[:links, :links], directions[:links:PARAMETERS, :links],
         ~moving)
 
 
@@ -233,8 +233,8 @@ def _notes(model: DriveModel, fitted: DriveModel, links: Array, masses: Array, s
     weak = np.einsum('kp,pq,kq->k', masses, links, masses) > (
         DETERMINED ** 2 * np.sum(masses ** 2, axis=1))
     notes = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
-             f'the motion determines {determined} combinations of the {len(links)} inertial '
-             'parameters of the links; all others stay near those of the URDF']
+             f'the motion determines {determined} of the {len(links)} inertial parameters of the '
+             'links, or combinations of them; all others stay near those of the URDF']
     if weak.any():
         notes.append('it does not determine the masses of the links that '
                      f'{", ".join(np.array(model.robot.body_joints)[weak])} move one by one')

@@ -34,7 +34,8 @@ from pprs_dynamics.physics.model.keys import GAIN
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-NODES_PER_PERIOD = 40  # of slow columns, see `Samples`
+# Of slow columns, see `Samples`; friction of a closed form turns where loads change sign.
+NODES_PER_PERIOD, CLOSED_FORM_NODES = 40, 120
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
@@ -174,9 +175,12 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
-        slow = samples = Samples.of(state, treat, [effect for effect in self.model.effects
-                                                   if isinstance(effect, MeasurementEffect)])
-        if self.model.robot.structure is None:
+        is_closed_form = self.model.robot.structure is None
+        slow = samples = Samples.of(
+            state, treat, [effect for effect in self.model.effects
+                           if isinstance(effect, MeasurementEffect)],
+            CLOSED_FORM_NODES if is_closed_form else NODES_PER_PERIOD)
+        if is_closed_form:
             # Friction follows the loads of the closed form: splines would be 1 % off.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
         columns: dict[str, Array] = {}
@@ -389,11 +393,12 @@ class Samples:
     nodes: Any
 
     @classmethod
-    def of(cls, state: Any, treat: Treatment, sensors: Sequence[MeasurementEffect]) -> Samples:
-        """Return the samples of a motion, with nodes by the period of its fastest part."""
+    def of(cls, state: Any, treat: Treatment, sensors: Sequence[MeasurementEffect],
+           per_period: int) -> Samples:
+        """Return the samples of a motion, with so many nodes per period of its fastest part."""
         count = len(state.velocity)
         period = min(1 / max(bandwidth(state.acceleration), 1e-300), count)
-        stride = int(period / NODES_PER_PERIOD)
+        stride = int(period / per_period)
         if stride < 2:
             return cls(state, treat, sensors, np.arange(count), state)
         at = np.round(np.linspace(0, count - 1, -(-(count - 1) // stride) + 1)).astype(int)

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from shutil import rmtree
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
     from pprs_dynamics.ros.live_joint_states import LiveNodes
 
 MOST_LISTED = 2000
-
-
-class NotOfferedError(PprsError, ValueError):
-    """A recording that is in no folder of the command line."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +57,10 @@ class Offered:
         return dict(islice(found, MOST_LISTED))
 
     def path(self, name: str) -> Path:
-        """Return the path of a name of `files`; NotOfferedError for any other."""
+        """Return the path of a name of `files`; SessionError for any other."""
         if (path := self.files().get(name)) is None:
-            raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
-                                  'that were given')
+            raise SessionError(f'{displayed(name)!r} is not among the recordings of the folders '
+                               'that were given')
         return path
 
 
@@ -98,7 +95,6 @@ class Hub:
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
-        self._is_unjudged = False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self.version = 0  # counts changes of the state
         self._uploaded, self._lock, self._opening = 0, Lock(), Lock()
@@ -196,14 +192,16 @@ class Hub:
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
         with self._opening:  # what a browser opens meanwhile comes on top
-            if self.inputs.recordings and self._done(
-                    lambda: self._use(Session.of(self.inputs))):
-                self._is_unjudged = True
+            is_unjudged = bool(self.inputs.recordings) and self._done(
+                lambda: self._use(Session.of(self.inputs)))
         self.is_beginning = False
         self._changed()
         while not self.is_over:
             if not self._work.wait(IDLE):
-                self._find_mistakes()
+                if is_unjudged and self.session is not None:
+                    # Units and signs of what the command line gave, once the page stands.
+                    is_unjudged, change = False, self.session.ticks.change_recordings
+                    self._done(partial(change, Inputs.checked))
                 self._diagnose()
                 self._work.wait()
             self._work.clear()
@@ -228,12 +226,6 @@ class Hub:
             self._notify()
             return False
         return True
-
-    def _find_mistakes(self) -> None:
-        """Look at units and signs of what the command line gave, once the page stands."""
-        if self.session is not None and self._is_unjudged:
-            self._is_unjudged, ticks = False, self.session.ticks
-            self._done(lambda: ticks.change_recordings(Inputs.checked))
 
     def _diagnose(self) -> None:
         session = self.session

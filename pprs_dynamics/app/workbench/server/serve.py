@@ -30,15 +30,11 @@ def listening(host: str, port: int) -> socket.socket:
     """
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        found = socket.socket(family, socket.SOCK_STREAM)
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        found.bind((host, port))
-        found.listen(MOST_CONNECTIONS)
+        return socket.create_server((host, port), family=family, backlog=MOST_CONNECTIONS)
     except (OSError, UnicodeError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
         raise ListenError(f'{displayed(host)}:{port}: cannot be listened on: {reason}; '
                           '--host must be an address of this machine, --port a free port') from None
-    return found
 
 
 def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
