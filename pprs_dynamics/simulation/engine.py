@@ -279,7 +279,7 @@ class MechanismEngine:
         """Return the forces across the axes of joints, (N, K, 3)."""
         bodies = [self.links[self.structure.rows[name]] for name in names]
         return np.cross(carried.forces[:, bodies],
-                     carried.axes[:, [self.state.number(name) for name in names]])
+                        carried.axes[:, [self.state.number(name) for name in names]])
 
     def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
         """Return efforts against friction of joints along a motion, (N, D); see `friction`.

@@ -142,7 +142,7 @@ def of_a_european_spreadsheet(folder: Path) -> list[Path]:
 
 def joined_logs(folder: Path) -> list[Path]:
     lines = pd.DataFrame({'micros': np.round(1e6 * TIME), **columns('enc_{joint}', Q),
-                   **columns('trq_{joint}', TAU)}).to_csv(index=False).splitlines()
+                          **columns('trq_{joint}', TAU)}).to_csv(index=False).splitlines()
     (folder / 'run.csv').write_text('\n'.join([*lines[:300], lines[0], *lines[300:]]))
     return [folder / 'run.csv']
 
@@ -228,8 +228,8 @@ def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(tmp_path: P
                     for k, name in enumerate(joints))
     (tmp_path / 'x.urdf').write_text(f'<robot name="x">{text}</robot>')
     for name, values in (('position', Q), ('effort', TAU)):
-        pd.DataFrame({'t': TIME, **{f'- arm_{k + 1}_joint_{name}': values[:, k]
-                             for k in (2, 0, 1)}}).to_csv(tmp_path / f'{name}.csv', index=False)
+        named = {f'- arm_{k + 1}_joint_{name}': values[:, k] for k in (2, 0, 1)}
+        pd.DataFrame({'t': TIME, **named}).to_csv(tmp_path / f'{name}.csv', index=False)
     first = first_model(tmp_path / 'x.urdf', [tmp_path / 'position.csv', tmp_path / 'effort.csv'],
                         tmp_path / 'robot.yaml')
     assert first.model.drives == joints[1:]

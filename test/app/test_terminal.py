@@ -83,7 +83,7 @@ def test_a_reader_that_goes_away_does_not_take_the_files_with_it(
     answer = folder / 'read.json'
     answer.unlink(missing_ok=True)
     done = process(folder, 'compare', 'run.csv', '--json', answer.name,
-                redirect=f'{redirect}; test -s {answer.name}')
+                   redirect=f'{redirect}; test -s {answer.name}')
     assert done.returncode == 0
     assert b'Traceback' not in done.stderr
     assert b'pipe' not in done.stderr
@@ -101,7 +101,7 @@ def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: st
     assert content['recordings'][0]['name'] == shown
     page = name.replace('.csv', '.html')
     done = process(folder, 'compare', name, '--report', page, '--json',
-                name.replace('.csv', '.json'))
+                   name.replace('.csv', '.json'))
     assert done.returncode == 0, done.stderr
     assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
     (folder / page).read_text(encoding='utf-8')

@@ -23,9 +23,9 @@ AFTER = (TIME > 12.0)[:, None]
 # Effects that the model lacks are no other unit.
 REAL = DriveModel.from_parameters(
     {**MODEL.values, 'effects.active': ['stribeck_friction', 'viscous_friction'],
-                    'effects.stribeck_friction.lift_1.force': 1.2,
-                    'effects.stribeck_friction.lift_1.velocity': 0.02,
-                    'effects.viscous_friction.slide_2.coefficient': 12.0})
+     'effects.stribeck_friction.lift_1.force': 1.2,
+     'effects.stribeck_friction.lift_1.velocity': 0.02,
+     'effects.viscous_friction.slide_2.coefficient': 12.0})
 FORCES = REAL.drive_forces(Excitation(20.0, 1).motion(TIME))
 NOISE = 0.05 * np.random.default_rng(0).normal(size=FORCES.total.shape)
 POSITION, EFFORT = FORCES.mechanism.position, FORCES.total + NOISE

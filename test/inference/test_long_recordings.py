@@ -24,7 +24,7 @@ RATE = 100.0  # [Hz]: every sample is a block
 def axis(**effects: Any) -> DriveModel:
     model = DriveModel.load('config/single_axis.yaml')
     changed = DriveModel.from_parameters({**model.values, **{key.replace('__', '.'): value
-                                              for key, value in effects.items()}})
+                                                             for key, value in effects.items()}})
     return changed
 
 

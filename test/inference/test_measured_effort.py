@@ -193,7 +193,7 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
 def test_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r'effort_kind is .*torque.*, must be one of measured, '):
         DriveModel.from_parameters({**DriveModel.load('config/single_axis.yaml').values,
-                     'effort_kind': 'torque'})
+                                    'effort_kind': 'torque'})
 
 
 def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

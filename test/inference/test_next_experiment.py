@@ -282,6 +282,6 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
     second = tmp_path / 'second.csv'
     write_recording(second, arm.record(real, moved, NOISE, seed=1))
     found = diagnose(arm_model, [read_recording(one_speed, arm_model.drives),
-                             read_recording(second, arm_model.drives)])
+                                 read_recording(second, arm_model.drives)])
     assert [one.name for one in found.effects] == ['viscous_friction']
     assert found.indistinguishable == ()

@@ -119,14 +119,15 @@ def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
 def wrist(model: DriveModel) -> DriveModel:
     """Return the arm with a motor that turns with two joints."""
     found = DriveModel.from_parameters({**model.values, 'friction.motors.wrist.turn': 1.0,
-                         'friction.motors.wrist.swing': 1.0}, model.source)
+                                        'friction.motors.wrist.swing': 1.0}, model.source)
     return found
 
 
 @pytest.mark.parametrize(('name', 'seed'), [
-    ('payload_mass', 1), ('coupled_drives', 1), *(pytest.param(name, 1, marks=pytest.mark.slow)
-     for name in ('link_mass', 'friction_temperature', 'friction_drift', 'counterbalance',
-                  'current_gain', 'effort_gain'))])
+    ('payload_mass', 1), ('coupled_drives', 1), *(
+        pytest.param(name, 1, marks=pytest.mark.slow)
+        for name in ('link_mass', 'friction_temperature', 'friction_drift', 'counterbalance',
+                     'current_gain', 'effort_gain'))])
 def test_what_is_hidden_is_named(wrist: DriveModel, name: str, seed: int) -> None:
     model = wrist
     run = simulate_mechanism(model, (name,), seed, thermometers=True)

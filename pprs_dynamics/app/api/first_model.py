@@ -224,7 +224,7 @@ def first_model(
         if not by_numbers:
             notes.append('joints are matched by the numbers in their names')
     draft = FirstModel(path, Path(output), is_mjcf, description, root_of(description), branch,
-                        chosen, names, given, notes)
+                       chosen, names, given, notes)
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(

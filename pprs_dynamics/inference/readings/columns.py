@@ -146,9 +146,9 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     main = quantity or POSITION
     known = [joint for joint in joints if (joint, main) in columns]
     if known and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
-        _ask_for_one(joints, stamp | columns, [each.column for each in titled if each.column not in
-                                       columns.values() and _fit(tuple(words_of(each.title)), {
-                                           '': each.column}, EFFORT, None)[0] > 0])
+        _ask_for_one(joints, stamp | columns, [
+            each.column for each in titled if each.column not in columns.values()
+            and _fit(tuple(words_of(each.title)), {'': each.column}, EFFORT, None)[0] > 0])
     if not known:
         raise GuessError(
             f'no columns of {main}s are told by their names: ' + ', '.join(
