@@ -201,18 +201,19 @@ class Design:
 
         Exact forces are known there, so that columns only say how forces change from there on.
         Those of numbers, which move within tolerances, and of positions stay (a chord method).
-        Effects in drives add no load: they change no other column, but for sensors of efforts,
-        which show all of them otherwise, and for errors of positions, with which friction turns
-        over at other times.
+        Effects in drives add no load: they change no other column, but for errors of positions,
+        with which friction turns over at other times. A sensor of efforts shows all but the columns
+        of positions otherwise.
         """
         effects = {e.effect for at in (point, self.point) if at is not None for e in at.effects}
-        is_alike = all(issubclass(effect, DriveEffect) and (
-            effect.shifts_positions() or not issubclass(effect, MeasurementEffect))
-            for effect in effects)
         turning = any(effect.shifts_positions() for effect in effects)
-        return {name: column for name, column in self.columns.items()
-                if name in (NUMBERS, HOMING, INERTIA)
-                or (is_alike and not (turning and name in (OF_DRIVES, OF_JOINTS)))}
+        kept = {HOMING, INERTIA}
+        if not any(issubclass(effect, MeasurementEffect) and not effect.shifts_positions()
+                   for effect in effects):
+            kept.add(NUMBERS)
+            if all(issubclass(effect, DriveEffect) for effect in effects):
+                kept |= self.columns.keys() - ({OF_DRIVES, OF_JOINTS} if turning else set())
+        return {name: column for name, column in self.columns.items() if name in kept}
 
     def beside(self, carried: CarriedOver | None) -> Design:
         """Return this with what a reference says of the recordings, or unchanged for None."""
