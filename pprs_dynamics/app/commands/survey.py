@@ -59,6 +59,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
         raise MissingLibraryError('distributed', 'a survey', 'fleet') from None
     library: Any = distributed  # its functions have no types
     settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
+                # What waits at a worker that dies would count as what killed it.
+                'distributed.scheduler.worker-saturation': 1.0,
                 'distributed.scheduler.worker-ttl': SILENCE,
                 'distributed.admin.log-format': '', 'logging.distributed': 'critical'}
     with dask.config.set(settings):
