@@ -122,9 +122,14 @@ class FittedSets:
             self._best = fitted
 
     def _explain(self, fitted: CandidateSet, form_of: Candidates) -> None:
-        """Let the set of which a candidate is a form error cost no more than with it."""
-        less = self.evaluate(form_of)
-        if fitted.plain < less.total:
+        """Let the set of which a candidate is a form error cost no more than with it.
+
+        It must explain more than the candidate alone, which else is no error of its form.
+        """
+        less, form = self.evaluate(form_of), tuple(
+            c for c in fitted.candidates if c not in form_of)
+        if fitted.plain < less.total and (form == fitted.candidates
+                                          or less.plain < self.evaluate(form).plain):
             self._keep(replace(less, with_form=fitted, terms=replace(
                 less.terms, forms=fitted.plain - less.plain)))
 

@@ -80,7 +80,6 @@ class FormErrors:
         """Return why a candidate may be a form error, and the set of which it may be one.
 
         Of several the candidate that the others replace best; '' and None where there is none.
-        No set is returned where the form of the input model's friction alone is in doubt.
 
         Parameters
         ----------
@@ -103,7 +102,7 @@ class FormErrors:
             if size < least * allowed:
                 least = size / allowed
                 found = (f'{candidate.name} may be the form error of {", ".join(names)}',
-                         None if self._own.issuperset(names) else fitted.without(candidate))
+                         fitted.without(candidate))
         return found
 
     def _symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> Candidates:
