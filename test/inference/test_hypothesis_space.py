@@ -296,9 +296,13 @@ def test_sets_with_a_nonlinear_effect_are_those_of_the_last_search(
 
 @pytest.mark.parametrize('number', range(2))
 def test_a_set_costs_no_more_than_with_its_form_error(number: int) -> None:
-    """Where structure_4 can only be a form error, no set has it, and all cost as with it."""
-    fits, free = (FittedSets(random_design({('structure_4', None): 1.5}, number), DECISIONS)
-                  for _ in range(2))
+    """Where structure_4 can only be a form error, no set has it.
+
+    The set of a larger effect costs as with it, and that of a smaller one as without it.
+    """
+    fits, free = (FittedSets(random_design({
+        ('structure_3', None): 1.5, ('structure_4', None): 1.0}, number), DECISIONS)
+        for _ in range(2))
 
     def reason(fitted: CandidateSet, covariance: Array) -> tuple[str, Candidates | None]:
         form = next((one for one in fitted.effects if one.name == 'structure_4'), None)
@@ -307,11 +311,14 @@ def test_a_set_costs_no_more_than_with_its_form_error(number: int) -> None:
     found = Search(fits).run()
     assert found.is_admissible
     assert 'structure_4' not in {name for name, _ in sets_of(found)}
-    form = next(one for one in everything() if one.name == 'structure_4')
-    for other in (one for one in everything() if one.name in ('structure_3', 'drive_1')):
+    form, larger, smaller = (next(one for one in everything() if one.name == name) for name in (
+        'structure_4', 'structure_3', 'drive_1'))
+    for other in (larger, smaller):
         fits.evaluate((other, form))
-        assert fits.evaluate((other,)).cost == pytest.approx(min(
-            free.evaluate(chosen).cost for chosen in ((other,), (other, form))))
+    with_it = free.evaluate((larger, form)).cost
+    assert with_it < free.evaluate((larger,)).cost
+    assert fits.evaluate((larger,)).cost == pytest.approx(with_it)
+    assert fits.evaluate((smaller,)).cost == pytest.approx(free.evaluate((smaller,)).cost)
 
 
 def test_blocks_are_predicted_worse_than_they_are_fitted() -> None:
