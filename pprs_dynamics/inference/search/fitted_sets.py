@@ -291,12 +291,9 @@ class FittedSets:
         """Return candidates after a Gauss-Newton step in shapes, of `longest` reaches at most."""
         slopes = self.slopes(fitted)
         moved: dict[Component, Component] = {}
-        for component in fitted.blocks:
-            if component.centre:
-                centre = centre_of(component.effect, component.names,
-                                   fitted.coefficients(component), self.design.given)
-                if max(abs(a - b) for a, b in zip(centre, component.centre, strict=True)) > NEAR:
-                    moved[component] = replace(component, centre=centre)
+        for component, centre in self._centres(fitted):
+            if _distance(centre, component.centre) > NEAR:
+                moved[component] = replace(component, centre=centre)
         if not slopes and not moved:
             return None
         fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)),
@@ -314,6 +311,16 @@ class FittedSets:
         return tuple(
             EffectCandidate.of(moved.get(component, component) for component in c.components)
             if isinstance(c, EffectCandidate) else c for c in fitted.candidates)
+
+    def _centres(self, fitted: CandidateSet) -> list[tuple[Component, tuple[float, ...]]]:
+        return [(component, centre_of(component.effect, component.names,
+                                      fitted.coefficients(component), self.design.given))
+                for component in fitted.blocks if component.centre]
+
+    def off_centre(self, fitted: CandidateSet) -> float:
+        """Return how far the bodies of a set are from where their columns are [m]."""
+        return max((_distance(centre, component.centre)
+                    for component, centre in self._centres(fitted)), default=0.0)
 
     def slopes(self, fitted: CandidateSet) -> list[tuple[Component, Block]]:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
@@ -338,6 +345,10 @@ class FittedSets:
             gap = known[at] - known[at - 1]
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
+
+
+def _distance(one: Sequence[float], other: Sequence[float]) -> float:
+    return max(abs(a - b) for a, b in zip(one, other, strict=True))
 
 
 def _gain(fit: JointFit, blocks: Sequence[Block]) -> float:

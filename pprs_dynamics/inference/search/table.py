@@ -369,15 +369,18 @@ def _with_exact_best(table: ModelTable) -> ModelTable:
 
 
 def _shortlist(fits: FittedSets) -> Iterable[CandidateSet]:
-    """Return the cheapest set of each choice of effects that may be the best by exact costs.
+    """Return a set of each choice of effects that may be the best by exact costs.
 
-    Those within the margin of rivals. Any nonlinear one where the cheapest set is nonlinear and
-    the columns are not around its model.
+    Of choices within the margin of rivals, and any nonlinear one where the cheapest set is
+    nonlinear and the columns are not around its model. Of sets that cost alike the one whose
+    bodies are where their columns are.
     """
-    best, near = fits.best, dict[RowKey, CandidateSet]()
+    best, near = fits.best, dict[RowKey, list[CandidateSet]]()
     is_far = not has_nonlinear(fits, best)
     for fitted in sorted(fits.sets, key=lambda fitted: fitted.cost):
         if fitted.cost <= best.cost + fits.decisions.rival_margin or (
                 is_far and fitted.is_nonlinear and fitted.is_admissible):
-            near.setdefault(fitted.row_key, fitted)
-    return list(near.values())[:MOST_EXACT]
+            alike = near.setdefault(fitted.row_key, [])
+            if not alike or fitted.cost < alike[0].cost + LEAST_CHANGE:
+                alike.append(fitted)
+    return [min(alike, key=fits.off_centre) for alike in near.values()][:MOST_EXACT]
