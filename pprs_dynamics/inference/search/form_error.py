@@ -38,11 +38,6 @@ from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 # paired recordings with 1 and 4: as many right but for one, and with 1 Coulomb and viscous friction
 # of like size are no longer two effects.
 SHAPES = 4
-# Ends of the names of coefficients that are of one direction, and of the other.
-SIDES = {'forward': 'backward', 'backward': 'forward', 'driving': 'driven_back',
-         'driven_back': 'driving'}
-# Beginnings of these names, and the effect that is the same in both directions.
-SYMMETRIC = {'force': 'coulomb_friction', 'viscous': 'viscous_friction', 'driv': 'load_friction'}
 Squares = dict[int, float]  # whitened squares of a force by drive
 # The idealised effects with a force on a drive, and their whitened forces there.
 Forces = dict[int, tuple[list[EffectCandidate], Array]]
@@ -110,8 +105,7 @@ class FormErrors:
         found = fitted.without(candidate)
         for component in candidate.components:
             known = {(one.effect.name, one.drive) for c in found for one in c.components}
-            for name in {SYMMETRIC[start] for start in SYMMETRIC for given in component.names
-                         if given.startswith(start)}:
+            for name in dict.fromkeys(map(candidate.effect.symmetric.__getitem__, component.names)):
                 if (name, component.drive) not in known:
                     effect = catalogue()[name]
                     found = joined(found, [replace(placed(
@@ -174,15 +168,12 @@ class FormErrors:
 
     def _is_symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> bool:
         """Return whether friction that differs by direction does so by less than its form error."""
-        if not candidate.effect.is_friction:
-            return False
-        half, whole = 0.0, 0.0
+        effect_of, half, whole = candidate.effect.symmetric, 0.0, 0.0
         for component in candidate.components:
             block, known = fitted.blocks[component], list(component.names)
-            others = [SIDES.get(word, word).join(name.rsplit(word, 1)) if (
-                word := next((side for side in SIDES if name.endswith(side)), '')) else ''
-                for name in known]
-            if not known or not set(others) <= set(known):
+            others = [next((other for other in known if other != name and name in effect_of
+                            and effect_of.get(other) == effect_of[name]), '') for name in known]
+            if not known or '' in others:
                 return False
             c = fitted.fit.of(block)
             mirrored = c.copy()

@@ -18,7 +18,9 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, SLIDE, MechanismState
 
-EXPONENTS = 1 / 3  # standard deviation of real exponents from 1
+# Standard deviation of real exponents from 1: friction of a Hertzian contact grows with the power
+# 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.
+EXPONENTS = 1 / 3
 LEAST_SHARE = 1e-3  # of the usual size, below which the logarithm goes no further
 
 

@@ -309,6 +309,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         not show every one of them is not worth telling.
     at_one_load : str
         Name of the effect that does the same where the load of a drive does not vary.
+    symmetric : mapping of str to str
+        Of coefficients of one direction, the effect that is the same in both directions.
     alike : tuple of tuple of str
         Groups of places at which the effect does the same in every motion.
     waves : tuple of Wave
@@ -334,6 +336,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_wave: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
     at_one_load: ClassVar[str] = ''
+    symmetric: ClassVar[Mapping[str, str]] = {}
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
     waves: ClassVar[tuple[Wave, ...]] = ()
 

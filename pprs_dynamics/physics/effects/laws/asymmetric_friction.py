@@ -11,7 +11,8 @@ rest.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -53,6 +54,9 @@ class AsymmetricFriction(DriveEffect):
     name = 'asymmetric_friction'
     is_friction = True
     at_one_load = 'gear_efficiency'
+    symmetric: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(FORCES, 'coulomb_friction'),
+        **dict.fromkeys(VISCOUS, 'viscous_friction')}
     linear = (
         Parameter('force_forward', 'F_f', 'N', 'dry friction forwards', -1e6, 1e6, 0.0, 0.5),
         Parameter('force_backward', 'F_b', 'N', 'dry friction backwards', -1e6, 1e6, 0.0, 0.5),

@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, other_exponent
 from pprs_dynamics.physics.effects.effect import Parameter
@@ -44,6 +47,8 @@ class GearEfficiency(DriveEffect):
     name = 'gear_efficiency'
     is_friction = True
     at_one_load = 'asymmetric_friction'
+    symmetric: ClassVar[Mapping[str, str]] = {
+        'driving': 'load_friction', 'driven_back': 'load_friction'}
     linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
                         'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
               Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '

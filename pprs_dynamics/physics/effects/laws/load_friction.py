@@ -14,9 +14,6 @@ from pprs_dynamics.physics.effects.drive_effect import (
 )
 from pprs_dynamics.physics.effects.effect import Parameter
 
-# Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
-# power 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.
-
 
 class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed.
