@@ -33,6 +33,7 @@ Motion = PlatformMotion | JointMotion
 Rows = dict[str, dict[str, Array]]  # curves by quantity and name
 MOST_SHOWN, MOST_LIMITS = 12, 6
 HIGH = 0.5  # use of a limit, from which on it is shown
+RATE = 100.0  # [Hz], the default of play_trajectory
 
 
 def platform_rows(motion: PlatformMotion) -> Rows:
@@ -52,9 +53,6 @@ def drive_rows(experiment: Experiment, motion: Motion) -> Rows:
             for name, unit, values in (
                 ('position', 'm', state.position), ('velocity', 'm/s', state.velocity),
                 ('acceleration', 'm/s^2', state.acceleration), ('effort', 'N', forces.total))}
-
-
-RATE = 100.0  # [Hz], the default of play_trajectory
 
 
 @dataclass(frozen=True, repr=False, eq=False)

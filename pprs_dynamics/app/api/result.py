@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
     from pandas import DataFrame as DataFrame
 
-
-if TYPE_CHECKING:
-    pass
+WIDTH = 100  # characters of a line of text
 
 
 def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
@@ -38,9 +36,6 @@ def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
             digest = samples_fingerprint(recording)
         yield (f'{recording.name}: {summary.used} samples, {summary.duration:.2f} s at '
                f'{summary.rate:.6g} Hz, sha256 {digest}')
-
-
-WIDTH = 100  # characters of a line of text
 
 
 class Result(ABC):

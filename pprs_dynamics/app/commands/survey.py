@@ -29,6 +29,9 @@ LOOPBACK = '127.0.0.1'
 ALLOWED_FAILURES = 2  # workers that an item may lose before it is given up
 REACHED_WITHIN = '15s'  # the scheduler
 SILENCE = '60s'  # without a message a worker is killed and started again
+MOST_SHOWN = 10  # errors
+MOST_WORKERS = 1024
+EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
 
 
 class SchedulerError(PprsError, ConnectionError):
@@ -103,12 +106,6 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
         else:
             error = future.exception()
             yield item, None, f'{type(error).__name__}: {error}'
-
-
-MOST_SHOWN = 10  # errors
-MOST_WORKERS = 1024
-
-EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

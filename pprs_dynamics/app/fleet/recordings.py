@@ -32,6 +32,9 @@ COLUMNS = {
     'evidence': NUMBER, 'rms': NUMBER, 'relative': NUMBER, 'noise': NUMBER, 'verdict': TEXT,
     'error': TEXT}
 
+ENDINGS = ('.csv', '.mcap', '.db3')
+BAG = 'metadata.yaml'  # in the folder of a rosbag2 recording
+
 
 def write_rows(store: Path, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write the rows of a recording as a file of a store, whole or not at all.
@@ -72,10 +75,6 @@ def read_rows(store: str) -> Any:
         raise UnreadableFileError(store, 'not a store, must be a folder that `pprs survey '
                                   '--output` wrote')
     return pd.concat(tables, ignore_index=True)
-
-
-ENDINGS = ('.csv', '.mcap', '.db3')
-BAG = 'metadata.yaml'  # in the folder of a rosbag2 recording
 
 
 class ManifestError(PprsError, ValueError):

@@ -48,6 +48,10 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.numbers import finite
 
 LARGEST = float_info.max  # whole numbers of JSON may be larger
+UPLOAD = '/api/upload'
+MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
+HEARTBEAT = 15.0  # [s] between signs of life
+LOOK = 0.02  # [s] between looks at whether something has changed
 
 
 class BadRequestError(PprsError, ValueError):
@@ -127,10 +131,6 @@ def binary(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Response:
     return Response(packed(header, arrays), media_type='application/octet-stream')
 
 
-UPLOAD = '/api/upload'
-MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
-HEARTBEAT = 15.0  # [s] between signs of life
-LOOK = 0.02  # [s] between looks at whether something has changed
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 
 # What the session is asked to do by POST, with a JSON object; all are answered by the screen.

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from pprs_dynamics.ros.live_joint_states import LiveNodes
 
 MOST_LISTED = 2000
+MOST_UPLOADS, LONGEST_NAME = 20, 80
+BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
+LAST_WORDS = 2.0  # [s] that work in the background gets to end
+IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,7 @@ def is_folder(path: str) -> bool:
         (Path(path) / BAG).exists() or any(Path(path).glob('*.db3')))
 
 
-MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
-BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
-LAST_WORDS = 2.0  # [s] that work in the background gets to end
-IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
 class Hub:
