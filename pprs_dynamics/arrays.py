@@ -29,7 +29,7 @@ def as_numbers(values: ArrayLike) -> Array:
         origin = np.zeros(1, f'{array.dtype.kind}8[ns]')
         return np.asarray((array - origin) / np.timedelta64(1, 's'), dtype=float)
     if array.dtype == object:
-        return np.array([np.nan if _is_missing(one) else float(one) for one in array.flat],
+        return np.array([np.nan if _is_missing(x) else float(x) for x in array.flat],
                         dtype=float).reshape(array.shape)
     return np.array(array, dtype=float)
 

@@ -54,7 +54,7 @@ def common_effort(units: Sequence[DriveUnits]) -> str:
 
 def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
     """Return a quantity's unit over all drives, or the units of both kinds; see `DriveUnits.of`."""
-    return ' or '.join(sorted({one.of(unit) for one in units})) or unit
+    return ' or '.join(sorted({known.of(unit) for known in units})) or unit
 
 
 # What may be measured of drives beside their motion and effort, and its unit in one that pushes:

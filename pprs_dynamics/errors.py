@@ -51,7 +51,7 @@ def beside(path: object) -> str:
     folder, name = os.path.split(os.fspath(path) if isinstance(path, os.PathLike) else str(path))
     try:
         with os.scandir(folder or '.') as entries:
-            names = [one.name for one in islice(entries, MOST_FILES)]
+            names = [entry.name for entry in islice(entries, MOST_FILES)]
     except (OSError, ValueError):
         return ''
     close = meant(name, names)

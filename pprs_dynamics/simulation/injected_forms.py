@@ -38,7 +38,7 @@ def draw_temperatures(rng: np.random.Generator, time: Array, velocity: Array) ->
         [s]
     velocity : (N, D) array
     """
-    mean, wave, period, phase = (float(rng.uniform(*one)) for one in (
+    mean, wave, period, phase = (float(rng.uniform(*limits)) for limits in (
         HALL, WAVE, PERIOD, (0, 2 * np.pi)))
     rise, cooling = (rng.uniform(*each, velocity.shape[1]) for each in (RISE, COOLING))
     speed = np.abs(velocity)

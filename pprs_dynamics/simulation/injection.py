@@ -273,9 +273,9 @@ class Injection(Injecting):
         for share, (start, effects) in enumerate(STAGES, 1):
             start(self)
             # Forces of drives are drawn in the order in which they were named.
-            for choice in sorted((one for one in choices if one.name in effects),
-                                 key=lambda one: 0 if effects is FORCES
-                                 else list(effects).index(one.name)):
+            for choice in sorted((drawn for drawn in choices if drawn.name in effects),
+                                 key=lambda drawn: 0 if effects is FORCES
+                                 else list(effects).index(drawn.name)):
                 self.truths.append(self.inject_one(choice, effects[choice.name]))
             if progress is not None:
                 progress(share / len(STAGES))

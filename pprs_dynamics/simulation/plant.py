@@ -323,11 +323,11 @@ class Plant(Injecting):
         """Return injected forces that do not follow velocities, and slopes of those that do."""
         force, slope = np.zeros_like(position), np.zeros_like(position)
         for j, name, drawn, nominal in self._pushes:
-            one, following = slice(j, j + 1), [(j + 1) % len(position)]
+            only, following = slice(j, j + 1), [(j + 1) % len(position)]
             moment = JointMoment(
-                np.array([self.time]), position[one], velocity[one], self.last_acceleration[one],
-                self._load[one], nominal.effort, nominal.speed, nominal.gear_ratio,
-                np.interp([self.time], nominal.time, nominal.temperature), self._pressed[one],
+                np.array([self.time]), position[only], velocity[only], self.last_acceleration[only],
+                self._load[only], nominal.effort, nominal.speed, nominal.gear_ratio,
+                np.interp([self.time], nominal.time, nominal.temperature), self._pressed[only],
                 velocity[following])
             pushed = float(OF_MOMENT[name].force(drawn, moment)[0])
             if 'friction' in name and pushed * velocity[j] > 0:

@@ -40,8 +40,8 @@ class lazy(Generic[Result]):
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, one: object, owner: type | None = None) -> Result:
-        if one is None:
+    def __get__(self, instance: object, owner: type | None = None) -> Result:
+        if instance is None:
             return self  # type: ignore[return-value]  # of the class, for documentation
-        value = vars(one)[self._name] = self._make(one)
+        value = vars(instance)[self._name] = self._make(instance)
         return value

@@ -449,11 +449,11 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _is_short_for(one: str, other: str) -> bool:
+def _is_short_for(first: str, other: str) -> bool:
     """Return whether the words of one name begin with those of another, as j1 of joint_1."""
-    one, other = (''.join(word for word in words_of(name) if not word.isdigit())
-                  for name in (one, other))
-    return one.startswith(other) or other.startswith(one)
+    first, other = (''.join(word for word in words_of(name) if not word.isdigit())
+                    for name in (first, other))
+    return first.startswith(other) or other.startswith(first)
 
 
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Mapping[str, str],

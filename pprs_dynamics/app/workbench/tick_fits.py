@@ -144,8 +144,8 @@ class TickFits:
         with self._scanning:
             if drives is None or not issubclass(effect, DriveEffect):
                 return next((c for c in self._proposed(found) if c.effect is effect), None)
-            placements = [one for d in drives
-                          if (one := self._on_drive(effect, d, found)) is not None]
+            placements = [placement for d in drives
+                          if (placement := self._on_drive(effect, d, found)) is not None]
         if not placements or len(placements) < len(drives):
             return None
         return EffectCandidate.of(placements)

@@ -260,7 +260,7 @@ def _with_effect(case: _Case, request: EffectRequest, beside: Sequence[FoundEffe
     if others:
         remarks.append(f'The recordings also show {listed(others)}')
     # Without the other effects of the row, in the values that they all have together.
-    known = [component for c in row.effects for one in beside if one.name == c.name
+    known = [component for c in row.effects for effect in beside if effect.name == c.name
              for component in c.components]
     held_out = [] if case.validate else [
         hold_out(row.fits, row.fitted, only).error

@@ -166,10 +166,10 @@ def platform_motion(series: JointSeries, time: Array) -> PlatformMotion:
 
     moved = series.motion(time)
     psi, theta, _ = moved.position[:, 3:].T
-    zero, one = np.zeros_like(psi), np.ones_like(psi)
+    zero, unit = np.zeros_like(psi), np.ones_like(psi)
     # Axes of the three turns in `base`; the earlier turns carry the later axes along.
     axes = [np.stack(axis, axis=1) for axis in (
-        (zero, zero, one), (-np.sin(psi), np.cos(psi), zero),
+        (zero, zero, unit), (-np.sin(psi), np.cos(psi), zero),
         (np.cos(psi) * np.cos(theta), np.sin(psi) * np.cos(theta), -np.sin(theta)))]
     about_z, about_y, about_x = (
         rate[:, None] * axis for rate, axis in zip(moved.velocity[:, 3:].T, axes, strict=True))

@@ -147,8 +147,8 @@ def _with_widths(regression: Regression, width: Array,
         for j in regression.drives:
             # What reverses over all of the joint's speeds would be a curve through them.
             speed = speeds[regression.series[j].index, j]
-            tried = {dry_friction(j, one): one for one in np.maximum(width[j] * WIDTHS, 1e-6)
-                     if np.mean(speed > TURNED * one) >= LEAST_MOVING}
+            tried = {dry_friction(j, v): v for v in np.maximum(width[j] * WIDTHS, 1e-6)
+                     if np.mean(speed > TURNED * v) >= LEAST_MOVING}
             cost = {block: regression.at([*blocks[:j], block, *blocks[j + 1:]], fit.amplitudes
                                          ).deviance for block in tried}
             blocks[j] = min(cost, key=cost.__getitem__, default=blocks[j])

@@ -126,16 +126,16 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
         Where positions of the joints cannot be found, or two readings are as likely.
     """
     time, fraction, time_scale, notes = _time(series, rate is not None)
-    left = [one for one in series if time is None or one.column not in (time.column, fraction)]
+    left = [item for item in series if time is None or item.column not in (time.column, fraction)]
     # pandas numbers rows in a column without a title, as other programs do.
-    left = [one for one in left if one.title or not _rises(one.values)
-            or not _counts_rows(one.values)]
+    left = [item for item in left if item.title or not _rises(item.values)
+            or not _counts_rows(item.values)]
     if not left:
         raise GuessError('no column holds numbers beside times')
     stamp: Columns = {('', key): column for key, column in (
         ('time', None if time is None else time.column), ('time_fraction', fraction))
         if column is not None}
-    titled = [one for one in left if one.title]
+    titled = [item for item in left if item.title]
     if titled:
         columns, found = _by_names(titled, joints, quantity, others)
     else:
@@ -154,7 +154,7 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
             f'no columns of {main}s are told by their names: ' + ', '.join(
                 each.title or str(each.column) for each in left[:12])
             + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {left[0].column}}}}}')
-    by_column = {one.column: one for one in series}
+    by_column = {item.column: item for item in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
     without_unit = [key for key, column in columns.items() if key[1] == POSITION
@@ -299,15 +299,15 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
               others: Collection[str]) -> tuple[Columns, list[str]]:
     groups: dict[tuple[str, ...], dict[str, Column]] = {}
     unnamed = []
-    for one in series:
-        words = words_of(one.title)
+    for item in series:
+        words = words_of(item.title)
         place = joint_in(words, list(dict.fromkeys((*joints, *others))))
         if place is None:
-            unnamed.append(one)
+            unnamed.append(item)
         elif place[0] in joints:
             joint, at, length = place
             key = (*words[:at], '*', *words[at + length:])
-            groups.setdefault(key, {}).setdefault(joint, one.column)
+            groups.setdefault(key, {}).setdefault(joint, item.column)
     notes = []
     for key, numbers in _numbered(unnamed).items():
         if key not in groups and (len(numbers) >= len(joints) or len(joints) == 1):
@@ -317,8 +317,8 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
                 notes.append(f'{" ".join(key)}: {len(numbers)} columns, of which the first '
                              f'{len(joints)} are taken as the joints from base to tool')
     if len(joints) == 1:
-        for one in series:
-            groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
+        for item in series:
+            groups.setdefault(tuple(words_of(item.title)), {}).setdefault(joints[0], item.column)
     columns: Columns = {}
     values = np.column_stack([each.values for each in series])
     places = {each.column: k for k, each in enumerate(series)}
@@ -408,12 +408,12 @@ def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int
 def _numbered(series: Sequence[Series]) -> dict[tuple[str, ...], dict[int, Column]]:
     """Return columns that differ in a number alone, by their other words; gaps end them."""
     found: dict[tuple[str, ...], dict[int, Column]] = {}
-    for one in series:
-        words = words_of(one.title)
+    for item in series:
+        words = words_of(item.title)
         for at, word in enumerate(words):
             if word.isdigit() and len(word) < 4:
                 key = (*words[:at], '*', *words[at + 1:])
-                found.setdefault(key, {}).setdefault(int(word), one.column)
+                found.setdefault(key, {}).setdefault(int(word), item.column)
     return {key: numbers for key, numbers in found.items()
             if len(numbers) > 1 and max(numbers) - min(numbers) == len(numbers) - 1}
 

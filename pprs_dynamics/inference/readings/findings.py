@@ -67,7 +67,7 @@ def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | 
 
 def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]:
     """Return what of the findings of recordings says that efforts are no measurement."""
-    return [one for each in findings for one in each if isinstance(one, NoMeasurement)]
+    return [finding for each in findings for finding in each if isinstance(finding, NoMeasurement)]
 
 
 @dataclass(frozen=True)

@@ -284,8 +284,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         Whether all positions are whole numbers, as encoders count.
     """
     every = tuple(range(len(drives)))
-    same, zero, one = np.arange(len(drives)), np.zeros(len(drives)), np.ones(len(drives))
-    rows = [Reading('', '', (), 0.0, one, zero, same, same, one)]
+    same, zero, ones = np.arange(len(drives)), np.zeros(len(drives)), np.ones(len(drives))
+    rows = [Reading('', '', (), 0.0, ones, zero, same, same, ones)]
 
     def add(kind: str, what: str, group: tuple[int, ...], more: float = 0.0, **changes: Any,
             ) -> None:

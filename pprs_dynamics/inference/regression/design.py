@@ -224,11 +224,11 @@ class Design:
             {d: row - slope[:, d] for d, row in rows.items()}
             for rows, slope in zip(self.homing, carried.per_position(self.residuals), strict=True))
         alone = carried.at_full_rate(self.recordings, self.residuals.time)
-        recordings = tuple(replace(one, effort=one.effort + more)
-                           for one, more in zip(self.recordings, alone, strict=True))
+        recordings = tuple(replace(recording, effort=recording.effort + more)
+                           for recording, more in zip(self.recordings, alone, strict=True))
         late = replace(self, recordings=tuple(
-            replace(one, effort=more)
-            for one, more in zip(self.recordings, alone, strict=True)))._shown_late()
+            replace(recording, effort=more)
+            for recording, more in zip(self.recordings, alone, strict=True)))._shown_late()
         residuals = replace(self.residuals, measured=self.residuals.measured - forces - late)
         return replace(self, residuals=residuals, recordings=recordings, homing=homing,
                        base=(*self.base, *carried.directions), carried=carried)
@@ -405,8 +405,8 @@ class Design:
                  if is_open(None, number, column)]
         for effect in given.effects:
             if isinstance(effect, (DriveEffect, StructureEffect)):
-                base += [replace(one, rows=design.present_rows(one))
-                         for one in present_columns(effect, effect_uncertainties(
+                base += [replace(column, rows=design.present_rows(column))
+                         for column in present_columns(effect, effect_uncertainties(
                              given.values, effect.name))]
         return replace(design, base=tuple(base))
 
@@ -528,14 +528,14 @@ class Design:
         the one of `SIZES` that alone explains most of the drive's error.
         """
         name = self.drives[drive]
-        there = next((one for one in self.model.effects
-                      if isinstance(one, effect) and name in one.drives), None)
+        there = next((present for present in self.model.effects
+                      if isinstance(present, effect) and name in present.drives), None)
         before = {c.name: 0.0 for c in effect.coefficients} if there is None else (
             effect.to_coefficients(there.drives[name]))
 
         def read(coefficients: Mapping[str, float]) -> list[Array]:
-            one = effect({name: {**effect.from_coefficients(coefficients), **shape}})
-            return [self._misread(one, recording, reconstruction, drive)
+            tried = effect({name: {**effect.from_coefficients(coefficients), **shape}})
+            return [self._misread(tried, recording, reconstruction, drive)
                     for recording, reconstruction in zip(
                         self.recordings, self.reconstructions or [None], strict=True)]
 
@@ -565,10 +565,10 @@ class Design:
                 if (rows_there := changed(c, step)) is None:
                     break  # no reversal comes back by as much
                 found.append((step, rows_there))
-            step, best = max(found, default=(1.0, none), key=lambda one: float(
-                (2 * error - one[1][drive]) @ one[1][drive]))
+            step, best = max(found, default=(1.0, none), key=lambda scored: float(
+                (2 * error - scored[1][drive]) @ scored[1][drive]))
             rows.append({d: row / step for d, row in best.items()})
-        return {d: np.stack([one[d] for one in rows]) for d in range(len(self.drives))}
+        return {d: np.stack([row[d] for row in rows]) for d in range(len(self.drives))}
 
     def _felt(self, recording: FullRate, drive: int, change: Array) -> Array:
         """Return errors of position and acceleration, and what the drive's own friction makes.

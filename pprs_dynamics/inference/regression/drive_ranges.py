@@ -57,7 +57,7 @@ def _delay(recording: FullRate, drive: int) -> float:
     viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
     explains little is like nothing by itself.
     """
-    part = max(recording.segments, key=lambda one: one.stop - one.start)
+    part = max(recording.segments, key=lambda segment: segment.stop - segment.start)
     time = recording.time[part]
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     even = np.arange(time[0], time[-1], step) if step else np.zeros(0)
@@ -98,12 +98,12 @@ class SecondEncoders:
     def of(cls, recordings: Sequence[FullRate], reconstructions: Sequence[Reconstruction],
            ) -> SecondEncoders:
         """Return it for recordings and their motion as it was read."""
-        read = [(one.transmitted, one.direction, found.windup) for one, found in zip(
+        read = [(run.transmitted, run.direction, found.windup) for run, found in zip(
             recordings, reconstructions, strict=False) if found.windup is not None]
         windups, clearances = {}, {}
         for d in range(read[0][0].shape[1] if read else 0):
-            load, direction = (np.concatenate([one[k][:, d] for one in read]) for k in (0, 1))
-            lead = np.concatenate([one[:, :, d] for *_, one in read], axis=1)
+            load, direction = (np.concatenate([part[k][:, d] for part in read]) for k in (0, 1))
+            lead = np.concatenate([windup[:, :, d] for *_, windup in read], axis=1)
             if not np.any(lead):
                 continue
             if np.ptp(load):
@@ -113,7 +113,7 @@ class SecondEncoders:
                                         float(np.var(windup) / np.var(load)))
             clearances[d] = max(
                 _clearance(lead[0], direction, 'motion'),
-                _clearance(lead[0], np.sign(load), 'load'), key=lambda one: one.explained)
+                _clearance(lead[0], np.sign(load), 'load'), key=lambda found: found.explained)
         return cls(windups, clearances)
 
 

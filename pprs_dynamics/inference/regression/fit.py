@@ -109,9 +109,9 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | Non
     rows = [column.reshape(series.shape) for column in columns.values()]
     blocks = [regression.block(
         {d: row[:, d] for d in range(series.shape[1]) if np.any(row[:, d])},
-        None if one.std == inf else np.array([[one.std ** -2]]),
-        None if one.std == inf else np.array([one.mean]))
-        for row, one in zip(rows, priors, strict=True)]
+        None if known.std == inf else np.array([[known.std ** -2]]),
+        None if known.std == inf else np.array([known.mean]))
+        for row, known in zip(rows, priors, strict=True)]
     if noise is None:
         found = regression.fit(blocks)
     else:
@@ -119,7 +119,7 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | Non
         amplitudes[:, 0] = noise ** 2
         found = regression.at(blocks, amplitudes)
     index = np.arange(len(blocks))
-    bounds = np.array([one[2:] for one in priors]).reshape(-1, 2)
+    bounds = np.array([known[2:] for known in priors]).reshape(-1, 2)
     A, b = np.concatenate((np.eye(len(blocks)), -np.eye(len(blocks)))), np.concatenate(
         (bounds[:, 0], -bounds[:, 1]))
     known = np.isfinite(b)
@@ -135,4 +135,4 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | Non
         dict(zip(columns, found.coefficients.tolist(), strict=True)),
         dict(zip(columns, spread.tolist(), strict=True)), found.covariance, found.deviance,
         series - explained,
-        np.array([one.rms for one in regression.noise(found).values()]), found)
+        np.array([drive.rms for drive in regression.noise(found).values()]), found)

@@ -122,7 +122,7 @@ class Regression:
         every = {d: DriveSeries(residuals, d, self.bands, open_forces.get(d))
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
         least = LEAST_SAMPLES if np.any(residuals.variables.get('velocity', 1)) else LEAST_POSES
-        self.series = {d: one for d, one in every.items() if len(one) >= least}
+        self.series = {d: series for d, series in every.items() if len(series) >= least}
         self.drives = tuple(self.series)
         if not self.drives:
             most = max(map(len, every.values()), default=0)
@@ -415,8 +415,8 @@ class Columns:
         if not new:
             return
         if len(self._crosses) > MOST_CROSSES * len(self.rows):
-            self._crosses = {one: cross for one, cross in self._crosses.items()
-                             if one[1] is None or one[1] in blocks}
+            self._crosses = {key: cross for key, cross in self._crosses.items()
+                             if key[1] is None or key[1] in blocks}
         rows, base = self.rows[d], self.regression.base[d]
         others = [base if block is None else block.rows[d] for block in new]
         found = self.regression.series[d].products(

@@ -86,8 +86,8 @@ def deviation_rows(design: Design, term: Term, units: Array) -> Array:
                 else np.zeros((len(units), 0, len(design.residuals))))
 
     return _treated(design, len(units), lambda recording: [
-        units @ np.stack(one)
-        for one in effect.deviations(recording.samples(slice(None), d), **term.shape)])
+        units @ np.stack(deviation)
+        for deviation in effect.deviations(recording.samples(slice(None), d), **term.shape)])
 
 
 def _treated(design: Design, count: int, rows: Callable[[FullRate], Sequence[Array]]) -> Array:
@@ -115,12 +115,12 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
         state = forces.mechanism
         columns = np.stack([passive_reversal_columns(unit, state) for unit in units])
         for sensor in sensors:
-            columns = np.stack([[sensor.measured(column, state) for column in one]
-                                for one in columns])
+            columns = np.stack([[sensor.measured(column, state) for column in columns_of]
+                                for columns_of in columns])
         return {'rows': treat(columns.transpose(2, 0, 1, 3))}
 
     stacked = np.concatenate([
         treated_forces(model, reconstruction, more=rows)['rows']
         * reconstruction.recorded_share(model)
         for reconstruction in design.reconstructed(model)]).transpose(3, 1, 2, 0)
-    return {d: one for d, one in enumerate(stacked) if np.any(one)}
+    return {d: rows for d, rows in enumerate(stacked) if np.any(rows)}

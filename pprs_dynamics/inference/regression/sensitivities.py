@@ -88,8 +88,8 @@ def model_numbers(model: DriveModel) -> tuple[Number, ...]:
             continue
         value = model.values[key]
         elements = enumerate(value) if isinstance(value, tuple) else [(None, value)]
-        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS,
-                         _unit(model, key, element)) for element, one in elements if one]
+        found += [Number(key, element, value, abs(value) * tolerance / DEVIATIONS,
+                         _unit(model, key, element)) for element, value in elements if value]
     return tuple(found)
 
 
@@ -147,7 +147,7 @@ class Sensitivities:
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
-        self.searched = tuple(one for one in self.searched if one in effects)
+        self.searched = tuple(effect for effect in self.searched if effect in effects)
         if not any(effect.shifts_positions() and effect in effects
                    for effect in catalogue().values()):
             self.of_zeros = False
@@ -190,7 +190,7 @@ class Sensitivities:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
                 np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
-            for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
+            for friction in (e for e in following(self.model) if e.name == PASSIVE_FRICTION):
                 columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
         if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
@@ -198,7 +198,7 @@ class Sensitivities:
         there = {effect.name for effect in self.given.effects}
         present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
                    if isinstance(effect, StructureEffect) and effect.name in there}
-        for name, effect in {**{one.name: one for one in self.searched}, **present}.items():
+        for name, effect in {**{e.name: e for e in self.searched}, **present}.items():
             if name in self.known:
                 continue
             if issubclass(effect, BodyEffect):
@@ -270,7 +270,7 @@ class Sensitivities:
                 value: Any = self.model.values[number.key]
                 if isinstance(value, tuple):
                     value = tuple(
-                        one + RELATIVE_STEP * given * (alone in (None, k)) for k, (one, given)
+                        now + RELATIVE_STEP * given * (alone in (None, k)) for k, (now, given)
                         in enumerate(zip(value, self.given.values[number.key], strict=True)))
                 else:
                     value += RELATIVE_STEP * number.value
@@ -310,8 +310,8 @@ class Sensitivities:
 
     def _present(self, effect: type[StructureEffect]) -> StructureEffect | None:
         """Return an effect as the model has it."""
-        return next((one for one in self.model.effects if one.name == effect.name
-                     and isinstance(one, StructureEffect)), None)
+        return next((present for present in self.model.effects if present.name == effect.name
+                     and isinstance(present, StructureEffect)), None)
 
     def _of_forces(self, effect: type[StructureEffect], state: Any) -> list[Array]:
         """Return columns of an effect that adds forces, per unit of each coefficient.
@@ -346,8 +346,8 @@ class Sensitivities:
         full, bare = [], []
         for c, moved in zip(effect.coefficients, self._steps[effect], strict=True):
             found = moved.apply(state) if present is None else self._at(replace(
-                self.model, effects=tuple(moved if one is present else one
-                                          for one in self.model.effects)), state)
+                self.model, effects=tuple(moved if other is present else other
+                                          for other in self.model.effects)), state)
             full.append((self._efforts(self.model, found) - before) / c.scale)
             bare.append((found.rigid_force - state.rigid_force) / c.scale)
         return full, bare

@@ -56,7 +56,7 @@ def _is_excerpt(recording: Recording) -> bool:
 
 
 def _step(recording: Recording) -> float:
-    part = max(recording.segments, key=lambda one: one.stop - one.start)
+    part = max(recording.segments, key=lambda segment: segment.stop - segment.start)
     return float(np.median(np.diff(recording.time[part])))
 
 
@@ -119,8 +119,8 @@ def _moved(recording: Recording, pieces: Sequence[slice]) -> Array:
     """Return how far the drives move in pieces, each by its own range of positions, summed."""
     glance = max(1, round(GLANCE / _step(recording)))
     seen = [recording.position[part][::glance] for part in pieces]
-    ways = np.array([np.abs(np.diff(one, axis=0)).sum(axis=0) for one in seen])
-    span = np.ptp(np.concatenate([np.array([one.min(axis=0), one.max(axis=0)])
-                                  for one in seen]), axis=0)
+    ways = np.array([np.abs(np.diff(positions, axis=0)).sum(axis=0) for positions in seen])
+    span = np.ptp(np.concatenate([np.array([positions.min(axis=0), positions.max(axis=0)])
+                                  for positions in seen]), axis=0)
     total: Array = (ways / np.where(span > 0, span, np.inf)).sum(axis=1)
     return total

@@ -145,8 +145,8 @@ def _scored(amplitudes: Array, squares: Array, free: Array, least: Array, phi: A
         design = root[:, None] * phi
         scale = np.sqrt(np.sum(design ** 2, axis=2))
         wanted = root * (r2 / np.maximum(f, 1e-300) - low * phi.sum(axis=0))
-        above = np.stack([nnls(one.T, target, maxiter=MOST_ACTIVE)[0]
-                          for one, target in zip(design / scale[:, :, None], wanted, strict=True)])
+        above = np.stack([nnls(rows.T, target, maxiter=MOST_ACTIVE)[0]
+                          for rows, target in zip(design / scale[:, :, None], wanted, strict=True)])
         step = low + above / scale - a
         promised = np.sum((step @ phi) * (r2 / power ** 2 - f / power), axis=1)
         share = np.where(promised < CONVERGED, 0.0, 1.0)

@@ -259,8 +259,8 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
     def errors(of: Sequence[MeasurementEffect], position: Array) -> Array:
         found = np.zeros_like(position)
-        for one in of:
-            found += one.position_error(names, position)
+        for effect in of:
+            found += effect.position_error(names, position)
         return found
 
     q, v, a = (each[:, chosen] for each in (read.position, read.velocity, read.acceleration))

@@ -43,7 +43,7 @@ def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
     kind, prefix, away = term.effect, mass.removesuffix('mass'), np.array(centre)
 
     def moved(rows: Mapping[int, Array]) -> dict[int, Array]:
-        return {d: kind.rows_about(prefix, one, away) for d, one in rows.items()}
+        return {d: kind.rows_about(prefix, rows_of, away) for d, rows_of in rows.items()}
     return replace(term, rows=moved(term.rows),
                    bare=None if term.bare is None else moved(term.bare))
 
@@ -78,8 +78,8 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     prefix = mass.removesuffix('mass')
     at = [term.names.index(prefix + name) for name in (
         'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
-    stacked = np.concatenate([np.vstack((term.rows[d][at], error[:, d]))[:, known] / max(one, 1e-12)
-                              for d, one in scale.items() if d in term.rows
+    stacked = np.concatenate([np.vstack((term.rows[d][at], error[:, d]))[:, known] / max(std, 1e-12)
+                              for d, std in scale.items() if d in term.rows
                               for known in [np.isfinite(error[:, d])]], axis=1)
     reduced: Array = np.asarray(np.linalg.qr(stacked.T, mode='r'), dtype=float)
     weight = PULL * float(np.linalg.norm(reduced[:, -1]))

@@ -330,7 +330,7 @@ def body_planes(robot: Mechanism, component: Component, sign: float) -> BodyPlan
                        max(abs(c[0]), usual) * (NEAR * reach / REACH) ** 2)
             for extent, v in zip(extents, directions.T, strict=True):
                 if extent < -ROUNDING * size:
-                    yield np.array([v @ second_moments(one) @ v for one in unit]), MARGIN * size
+                    yield np.array([v @ second_moments(axis) @ v for axis in unit]), MARGIN * size
 
     def planes(c: Array) -> Inequalities:
         found = list(violated(c))

@@ -91,8 +91,8 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
         # Its shape was that of an effect that is there all the time.
         tried = sorted((fits.refined(fits.evaluate((*rest, offer.candidate)))
                         for offer in _best_of_each(offers)
-                        for rest in _rests(best, offer.candidate)), key=lambda one: one.total)
-        found = min(map(fits.pruned, tried[:PRUNED]), key=lambda one: one.cost, default=best)
+                        for rest in _rests(best, offer.candidate)), key=lambda found: found.total)
+        found = min(map(fits.pruned, tried[:PRUNED]), key=lambda fitted: fitted.cost, default=best)
         found = fits.refined(_refined(fits, found))
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
@@ -283,6 +283,6 @@ def _of_one_cause(fits: FittedSets, fitted: CandidateSet, effects: Iterable[Effe
                    (effect.name, course.kind))
                   for course in courses for rest in dict.fromkeys(((), beside))]
     best: dict[tuple[str, str], CandidateSet] = {}
-    for one, key in sorted(tried, key=lambda scored: scored[0].total):
-        best.setdefault(key, one)
+    for found, key in sorted(tried, key=lambda scored: scored[0].total):
+        best.setdefault(key, found)
     return list(best.values())[:COURSE_TRIALS]

@@ -174,7 +174,7 @@ def _beside_centre(component: Component, c: Array, fit: JointFit, index: Sequenc
     weights = inverse[0] / inverse[0, 0] * scale[0] / scale
     terms = [f'{"+" if weight > 0 else "-"} {abs(weight):.3g} moment_{axis}'
              for axis, weight in zip(AXES, weights[1:], strict=True) if abs(weight) > 1e-3]
-    total = component.total(c)[[one.name for one in component.effect.coefficients].index('mass')]
+    total = component.total(c)[[k.name for k in component.effect.coefficients].index('mass')]
     combination = Estimate(
         float(total), float(scale[0] * inverse[0, 0] ** -0.5), 'kg')
     # Without its prior; of a mass that is all prior, with a share of it (Sherman and Morrison).
@@ -362,7 +362,7 @@ def _moved(fits: FittedSets, component: Component, coefficients: Array) -> Compo
             for k, column in _present_at(fits, component)
             if isinstance(column, PresentCoefficient)}
     return replace(component, given=tuple(
-        one + base.get(p.name, 0.0) for one, p in zip(
+        given + base.get(p.name, 0.0) for given, p in zip(
             component.given, component.effect.coefficients, strict=True)))
 
 
@@ -379,7 +379,7 @@ def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Est
         if name in component.names:
             slope = np.array([weights.get(name, 0.0) for name in component.names])
             variance = slope @ covariance[:len(slope), :len(slope)] @ slope
-            value = sum(float(total[one]) * weight for one, weight in weights.items())
+            value = sum(float(total[key]) * weight for key, weight in weights.items())
             found[name] = Estimate(value, float(np.sqrt(max(variance, 0.0))), units[name])
     return found
 

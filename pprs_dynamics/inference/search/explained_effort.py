@@ -87,7 +87,7 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
             is_little = share < decisions.explained * _beyond_noise(effort, noise.get(name, 0.0))
         if is_little:
             little[name] = share
-    return dict(sorted(little.items(), key=lambda one: one[1]))
+    return dict(sorted(little.items(), key=lambda item: item[1]))
 
 
 def _beyond_noise(effort: Array, noise: float) -> float:

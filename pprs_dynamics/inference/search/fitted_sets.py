@@ -347,8 +347,8 @@ class FittedSets:
         return reach
 
 
-def _distance(one: Sequence[float], other: Sequence[float]) -> float:
-    return max(abs(a - b) for a, b in zip(one, other, strict=True))
+def _distance(first: Sequence[float], other: Sequence[float]) -> float:
+    return max(abs(a - b) for a, b in zip(first, other, strict=True))
 
 
 def _gain(fit: JointFit, blocks: Sequence[Block]) -> float:

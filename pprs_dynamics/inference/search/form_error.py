@@ -104,7 +104,7 @@ class FormErrors:
         """Return a set with friction that is the same in both directions for one that is not."""
         found = fitted.without(candidate)
         for component in candidate.components:
-            known = {(one.effect.name, one.drive) for c in found for one in c.components}
+            known = {(part.effect.name, part.drive) for c in found for part in c.components}
             for name in dict.fromkeys(map(candidate.effect.symmetric.__getitem__, component.names)):
                 if (name, component.drive) not in known:
                     effect = catalogue()[name]

@@ -203,6 +203,6 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
         rest = rows[-1] - np.sum(plain[block][:, index].T * rows[:-1], axis=0)
         squares, count = squares + float(rest @ rest), count + len(rest)
     return HeldOut(float(np.sqrt(squares / max(count, 1))),
-                   np.array([one.penalty for one in others]),
+                   np.array([other.penalty for other in others]),
                    replace(regression.residuals, measured=left, model=np.zeros_like(left),
                            parts={}, variables={}))

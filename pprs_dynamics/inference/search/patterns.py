@@ -251,7 +251,7 @@ def _velocity(name: str, values: Array, sign: Array | None, alike: int) -> Famil
             # Friction that falls off with speed has no edge.
             turned = (sign, _turned(values, REVERSAL_WIDTHS[1]))
             for edge in speeds[1:-1]:
-                columns.append(np.stack([one * np.exp(-(values / edge) ** 2) for one in turned]))
+                columns.append(np.stack([row * np.exp(-(values / edge) ** 2) for row in turned]))
                 weights.append(np.eye(len(turned)))
                 patterns += [Pattern('fading', (0.0, float(edge)))] * len(turned)
     return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),

@@ -191,9 +191,9 @@ class Search:
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         # Two effects on one drive may be one there, and something else on other drives.
-        for one, other in combinations(best.blocks, 2):
-            if one.drive == other.drive is not None:
-                yield from self._instead(best, reduced(best, one, other), REPLACEMENTS, one.drive)
+        for a, b in combinations(best.blocks, 2):
+            if a.drive == b.drive is not None:
+                yield from self._instead(best, reduced(best, a, b), REPLACEMENTS, a.drive)
         for candidate in best.effects:
             for shaped in self._alternatives(candidate):
                 yield exchanged(best, candidate, shaped)

@@ -261,7 +261,7 @@ def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
                                    f'{before}{name}.', depth + 1)
         elif (isinstance(value, np.ndarray) and value.dtype == object
               and value.ndim == 1 and len(value) and hasattr(value[0], '_fieldnames')):
-            yield from _fields({f'{name}[{k}]': one for k, one in enumerate(value)}, before,
+            yield from _fields({f'{name}[{k}]': item for k, item in enumerate(value)}, before,
                                depth + 1)
         else:
             yield f'{before}{name}', value
@@ -272,7 +272,7 @@ def _numpy(path: Path) -> dict[str, Any]:
         require_size(path, path.stat().st_size)
         return {MATRIX: np.load(path, allow_pickle=False)}
     with ZipFile(path) as archive:
-        require_size(path, sum(one.file_size for one in archive.infolist()))
+        require_size(path, sum(member.file_size for member in archive.infolist()))
     with np.load(path, allow_pickle=False) as content:
         return {name: content[name] for name in content.files}
 

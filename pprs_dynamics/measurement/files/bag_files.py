@@ -84,7 +84,7 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
         _chosen(bag, topic))
     if fields:
         return read_merged(bag, [*connections, *(
-            one for one in bag.connections if one.topic in topics and one not in connections)],
+            c for c in bag.connections if c.topic in topics and c not in connections)],
             drives, findings, fields)
     name = connections[0].topic
     if connections[0].msgtype != JOINT_STATE:
@@ -113,8 +113,8 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
         raise UnreadableFileError(
             bag.path, f'the position of {", ".join(mixed)} on {name} jumps back and forth from '
             'message to message: two nodes publish there; record one of them')
-    others = [one for one in bag.connections if one.msgtype == JOINT_STATE
-              and one.topic != name and channel_of(one.topic, one.msgtype) is None]
+    others = [c for c in bag.connections if c.msgtype == JOINT_STATE
+              and c.topic != name and channel_of(c.topic, c.msgtype) is None]
     if topic is None and others and np.all(np.isnan(effort)):
         merged = read_merged(bag, [*connections, *others], drives, findings)
         if np.any(np.isfinite(merged.effort)):

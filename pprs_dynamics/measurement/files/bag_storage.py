@@ -69,7 +69,7 @@ class Bag:
     @property
     def connections(self) -> list[Connection]:
         """Topics with their types, of every file."""
-        return [one for reader in self.readers for one in reader.connections]
+        return [c for reader in self.readers for c in reader.connections]
 
     def messages(self, connections: Collection[Connection],
                  ) -> Iterator[tuple[Connection, int, bytes]]:
@@ -82,11 +82,11 @@ class Bag:
         """
         types = self.types(connections) if self.is_ros1 else None
         try:
-            chosen = [(reader, [one for one in connections if one in reader.connections])
+            chosen = [(reader, [c for c in connections if c in reader.connections])
                       for reader in self.readers]
             # All connections is what a reader makes of none.
             streams = [reader.messages(own) for reader, own in chosen if own]
-            for connection, stamp, data in merge(*streams, key=lambda one: one[1]):
+            for connection, stamp, data in merge(*streams, key=lambda message: message[1]):
                 if not (isinstance(stamp, int) and isinstance(data, (bytes, memoryview))):
                     # A cell of sqlite is of any type, and a flipped bit makes it another one.
                     raise TypeError('a message is no bytes')
@@ -146,10 +146,10 @@ def opened_bag(path: Path) -> Iterator[tuple[Bag, list[Defect]]]:
         for storage in storages:
             _check_lengths(path, storage)
         require_rosbags('reading bags')
-        if any(one.suffix in ZSTANDARD for one in storages):
+        if any(storage.suffix in ZSTANDARD for storage in storages):
             folder = Path(stack.enter_context(TemporaryDirectory()))
-            storages = [_unpacked(one, folder) if one.suffix in ZSTANDARD else one
-                        for one in storages]
+            storages = [_unpacked(storage, folder) if storage.suffix in ZSTANDARD else storage
+                        for storage in storages]
         from rosbags import rosbag1, rosbag2
 
         is_ros1 = storages[0].suffix == '.bag'

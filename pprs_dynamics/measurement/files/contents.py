@@ -85,7 +85,7 @@ def _joints(bag: Bag) -> dict[str, dict[str, set[str]]]:
 
 def _arrays(bag: Bag) -> Iterator[Series]:
     """Yield the elements of std_msgs' arrays of numbers."""
-    kinds = {one.msgtype for one in bag.connections if one.msgtype.endswith('MultiArray')}
+    kinds = {c.msgtype for c in bag.connections if c.msgtype.endswith('MultiArray')}
     for topic, _, messages in _topics(bag, tuple(kinds)):
         rows = [np.asarray(message.data, dtype=float) for message in messages]
         count = min((len(row) for row in rows), default=0)
@@ -95,6 +95,6 @@ def _arrays(bag: Bag) -> Iterator[Series]:
 
 def _topics(bag: Bag, kinds: tuple[str, ...]) -> Iterator[tuple[str, str, list[Any]]]:
     """Yield topics of some types: name, type, first messages."""
-    for topic in sorted({one.topic for one in bag.connections if one.msgtype in kinds}):
-        own = [one for one in bag.connections if one.topic == topic and one.msgtype in kinds]
+    for topic in sorted({c.topic for c in bag.connections if c.msgtype in kinds}):
+        own = [c for c in bag.connections if c.topic == topic and c.msgtype in kinds]
         yield topic, own[0].msgtype, [message for *_, message in bag.decoded(own, MESSAGES)]

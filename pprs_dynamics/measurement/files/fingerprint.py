@@ -29,7 +29,7 @@ def fingerprint(path: str | PathLike[str]) -> str:
             with path.open('rb') as file:
                 return hashlib.file_digest(file, 'sha256').hexdigest()
         whole = hashlib.sha256()
-        for file_path in sorted(one for one in path.rglob('*') if one.is_file()):
+        for file_path in sorted(entry for entry in path.rglob('*') if entry.is_file()):
             name = file_path.relative_to(path).as_posix()
             whole.update(f'{name}\0{fingerprint(file_path)}\n'.encode())
         return whole.hexdigest()

@@ -81,7 +81,7 @@ def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
 
     Of std_msgs' arrays `/topic[2]` is enough.
     """
-    topics = sorted({one.topic for one in bag.connections}, key=len, reverse=True)
+    topics = sorted({c.topic for c in bag.connections}, key=len, reverse=True)
     columns = recorded.columns.drives if recorded.columns is not None else {}
     shared = recorded.columns.channels if recorded.columns is not None else {}
     found = []
@@ -91,8 +91,8 @@ def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
             name = str(column)
             if not name.startswith('/'):
                 continue
-            topic = next((one for one in topics if name.startswith(one)
-                          and name[len(one):][:1] in ('.', '[')), None)
+            topic = next((known for known in topics if name.startswith(known)
+                          and name[len(known):][:1] in ('.', '[')), None)
             if topic is None:
                 raise UnreadableFileError(
                     bag.path, f'no topic of the column {name}; it holds '
@@ -269,7 +269,7 @@ def read_channels(bag: Bag, joints: tuple[str, ...], stamps: Indices) -> dict[st
                 series[quantity, joint].append((stamp_of(message) or received, float(value)))
     found: dict[str, Array] = {}
     # What a drive has of its own counts for more than what is measured for all.
-    for (channel, joint), read in sorted(series.items(), key=lambda one: bool(one[0][1])):
+    for (channel, joint), read in sorted(series.items(), key=lambda item: bool(item[0][1])):
         array = found.setdefault(channel, np.full((len(stamps), len(joints)), np.nan))
         place = joints.index(joint) if joint else slice(None)
         times, values = zip(*read, strict=True)

@@ -241,11 +241,11 @@ def _scaled(samples: Samples, drives: RecordedDrives) -> Samples:
     of_drives = [given.get(drive, DriveColumns()) for drive in drives.names]
     velocity, effort = samples.velocity, samples.effort.copy()
     scale, offset, speed, force = np.array([
-        (one.position_scale, one.position_offset, one.velocity_scale, one.effort_scale)
-        for one in of_drives]).T
-    for d, one in enumerate(of_drives):
-        if one.effort_sign_bit is not None:
-            effort[:, d] = signed(effort[:, d], one.effort_sign_bit)
+        (names.position_scale, names.position_offset, names.velocity_scale, names.effort_scale)
+        for names in of_drives]).T
+    for d, names in enumerate(of_drives):
+        if names.effort_sign_bit is not None:
+            effort[:, d] = signed(effort[:, d], names.effort_sign_bit)
     position, wraps = unwrapped(samples.position * scale, [
         2 * np.pi if units.turns else np.inf for units in drives.units] or [np.inf] * len(scale))
     wrapped = [drive for drive, count in zip(drives.names, wraps.tolist(), strict=True) if count]
@@ -287,7 +287,7 @@ def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,
     gain = drives.gain
     currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | drives.in_amperes
     names = ', '.join(np.array(samples.drives)[currents])
-    is_known = gain is not None and any(one != 1 for one in gain)
+    is_known = gain is not None and any(factor != 1 for factor in gain)
     if not np.any(currents):
         unused = Defect('gain_unused', int(np.isfinite(samples.effort).sum()),
                         'the model has a gain, but these efforts are no columns of currents '

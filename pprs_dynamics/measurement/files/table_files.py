@@ -82,7 +82,7 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     stamps, epoch, prefix = np.zeros(0), 0, ''
     arrays: dict[tuple[str, str], Array] = {}
     told: list[Defect] = []
-    for quantity, file in sorted(files.items(), key=lambda one: one[0] != 'position'):
+    for quantity, file in sorted(files.items(), key=lambda item: item[0] != 'position'):
         table = _opened(file, columns)
         time = None if shared is not None else _time_column(table, columns)
         if columns.files:
@@ -111,8 +111,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
             told += remarks if columns.files else (*remarks, *_ignored(table, wanted))
         elif len(seconds) != len(stamps) or np.any(seconds != stamps):
             told.append(Defect('merged', len(stamps), f'{file.name} has times of its own'))
-            whole, at = (np.rint((one - stamps[0]) * 1e9).astype(np.int64)
-                         for one in (seconds, stamps))
+            whole, at = (np.rint((instants - stamps[0]) * 1e9).astype(np.int64)
+                         for instants in (seconds, stamps))
             series = {key: at_stamps(at, whole, values) for key, values in series.items()}
         arrays.update(series)
     return Samples.of_columns(joints, stamps, arrays, _source(path, columns, prefix), tuple(told),
@@ -135,9 +135,9 @@ def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Ta
 
 def _opened(path: Path, columns: RecordedColumns) -> Table:
     named = [columns.time_fraction, *columns.channels.values(),
-             *(one for of in columns.drives.values() for one in of.names.values())]
+             *(column for of in columns.drives.values() for column in of.names.values())]
     return open_table(path, columns.decimal,
-                      [one for one in (columns.time, *named) if isinstance(one, str)])
+                      [column for column in (columns.time, *named) if isinstance(column, str)])
 
 
 def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
@@ -240,7 +240,7 @@ def _seconds(stamps: Any, columns: RecordedColumns, count: int,
 
 def _ignored(table: Table, wanted: Sequence[Column]) -> tuple[Defect, ...]:
     every = table.names or [str(k + 1) for k in range(getattr(table, 'count', 0))]
-    places = [table.place(one) for one in wanted]
+    places = [table.place(column) for column in wanted]
     used = {every[place] if isinstance(place, int) else place[0]
             for place in places if place is not None}
     others = [name or '(no name)' for name in every if name not in used]

@@ -35,7 +35,7 @@ def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> s
     if prefix:
         return f'write joint_prefix: {prefix} in the model file'
     for drive in missing:
-        close = meant(drive, [one for one in known if one not in drives])
+        close = meant(drive, [recorded for recorded in known if recorded not in drives])
         if close and len(missing) < len(drives):
             return f'write joint_map: {{{drive}: {close}}} in the model file'
     return init_command(name)
@@ -43,7 +43,7 @@ def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> s
 
 def common_prefix(drives: Sequence[str], known: Collection[str]) -> str:
     """Return what stands before the names of all drives among those known; '' for nothing."""
-    first = [one.removesuffix(drives[0]) for one in known if one.endswith(drives[0])
+    first = [recorded.removesuffix(drives[0]) for recorded in known if recorded.endswith(drives[0])
              ] if drives else []
     return next((prefix for prefix in sorted(first, key=len) if prefix and all(
         f'{prefix}{drive}' in known for drive in drives)), '')

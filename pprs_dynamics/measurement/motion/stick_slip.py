@@ -62,10 +62,10 @@ def sticking_drives(recordings: Sequence[Recording]) -> dict[str, StickSlip]:
     for recording in recordings:
         for d, drive in enumerate(recording.drives):
             for part in recording.segments:
-                one = find_stick_slip(recording.time[part], recording.position[part, d],
-                                      recording.effort[part, d])
-                if one is not None and (drive not in found or one.slips > found[drive].slips):
-                    found[drive] = one
+                slip = find_stick_slip(recording.time[part], recording.position[part, d],
+                                       recording.effort[part, d])
+                if slip is not None and (drive not in found or slip.slips > found[drive].slips):
+                    found[drive] = slip
     return found
 
 
@@ -83,7 +83,7 @@ def find_stick_slip(time: Array, position: Array, effort: Array) -> StickSlip | 
         return None
     quantum = float(moved[moved > 0].min())
     found = [_within(time, position, effort, step, window, quantum) for window in WINDOWS]
-    return max((one for one in found if one is not None), key=lambda one: one.slips, default=None)
+    return max((s for s in found if s is not None), key=lambda s: s.slips, default=None)
 
 
 def _within(time: Array, position: Array, effort: Array, step: float, window: float,

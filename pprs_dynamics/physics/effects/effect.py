@@ -388,8 +388,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         if not cls.is_of_one_place:
             return ()
         places = dict.fromkeys(name.rpartition('.')[0] for name in names)
-        return tuple(next((tuple(sorted(group)) for group in cls.alike if one in group), (one,))
-                     for one in places)
+        return tuple(next((tuple(sorted(group)) for group in cls.alike if place in group), (place,))
+                     for place in places)
 
     @classmethod
     def bound(cls, robot: Any) -> type[Self]:

@@ -225,7 +225,7 @@ class AddedBody(BodyEffect):
             if mass := coefficients.get(f'{prefix}mass', 0.0):
                 away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
                                  for axis in AXES])
-                found = {d: cls.rows_about(prefix, one, away) for d, one in found.items()}
+                found = {d: cls.rows_about(prefix, columns, away) for d, columns in found.items()}
         return found
 
     @classmethod

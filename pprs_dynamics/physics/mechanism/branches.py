@@ -72,20 +72,20 @@ def likely_branches(description: Description, recorded: Collection[str] = ()) ->
     named = [link for link in description.links if _rank(link) < len(TOOLS)]
     closed = {link for loop in description.loops for link in (loop.a, loop.b)}
     found = [branch_to(description, link) for link in dict.fromkeys((*leaves, *named, *closed))]
-    longest = max((len(one.joints) for one in found), default=0)
+    longest = max((len(branch.joints) for branch in found), default=0)
 
-    def worth(one: Branch) -> tuple[int, ...]:
-        own = len({*one.names} & {*recorded})
+    def worth(branch: Branch) -> tuple[int, ...]:
+        own = len({*branch.names} & {*recorded})
         # A platform closes the most loops; a flange has fingers beyond it.
-        loops = sum(one.tool in (loop.a, loop.b) for loop in description.loops)
-        is_tool = _rank(one.tool) < len(TOOLS) and len(one.joints) >= longest - GRIPPER
-        missing = sum(name not in recorded for name in one.names) if recorded else 0
-        return (own, loops if loops > 1 else 0, -missing, int(is_tool), len(one.joints),
-                -_rank(one.tool))
+        loops = sum(branch.tool in (loop.a, loop.b) for loop in description.loops)
+        is_tool = _rank(branch.tool) < len(TOOLS) and len(branch.joints) >= longest - GRIPPER
+        missing = sum(name not in recorded for name in branch.names) if recorded else 0
+        return (own, loops if loops > 1 else 0, -missing, int(is_tool), len(branch.joints),
+                -_rank(branch.tool))
 
     best: dict[tuple[str, ...], Branch] = {}
-    for one in sorted(found, key=worth, reverse=True):
-        best.setdefault(one.names, one)
+    for branch in sorted(found, key=worth, reverse=True):
+        best.setdefault(branch.names, branch)
     return list(best.values())
 
 
@@ -94,8 +94,8 @@ def as_likely(description: Description, recorded: Collection[str] = ()) -> list[
     first, *others = likely_branches(description, recorded) or [
         Branch(root_of(description), ())]
     own = {*first.names}
-    return [first, *(one for one in others if len(one.joints) >= len(first.joints)
-                     and not own & {*one.names} and len({*one.names} & {*recorded})
+    return [first, *(branch for branch in others if len(branch.joints) >= len(first.joints)
+                     and not own & {*branch.names} and len({*branch.names} & {*recorded})
                      >= len(own & {*recorded}) and not description.loops)]
 
 

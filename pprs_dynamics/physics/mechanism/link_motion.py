@@ -171,12 +171,12 @@ class LinkMotion:
             along = torque[:, None] * m.z[:, row]
             none = np.zeros_like(along)
             # What the link of a joint applies, the one that it hangs on takes back.
-            for one, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
-                arm = m.p[:, row] - m.p[:, one]
+            for joint, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
+                arm = m.p[:, row] - m.p[:, joint]
                 force, moment = (none, sign * along) if t.turns[row] else (
                     sign * along, sign * np.cross(arm, along))
-                before = found.get(one, (none, none))
-                found[one] = (before[0] + force, before[1] + moment)
+                before = found.get(joint, (none, none))
+                found[joint] = (before[0] + force, before[1] + moment)
         return found
 
     def regressor(self, rows: Integers, gravity: Array) -> Array:

@@ -200,7 +200,7 @@ class _Reader:
                 kinds, place = [PRISMATIC], np.zeros(3)
             elif kind == self.mujoco.mjtJoint.mjJNT_BALL:
                 axes, kinds, ref = list(np.eye(3)), [REVOLUTE] * 3, 0.0
-            for n, (axis, one) in enumerate(zip(axes, kinds, strict=True)):
+            for n, (axis, joint_type) in enumerate(zip(axes, kinds, strict=True)):
                 own = self.names[k] if len(axes) == 1 else f'{self.names[k]}_{"xyz"[n]}'
                 last = k == first + count - 1 and n == len(axes) - 1
                 # About the joint's own place, which a link without mass stands for.
@@ -208,10 +208,10 @@ class _Reader:
                 links[child] = np.zeros(PARAMETERS)
                 lower, upper = (model.jnt_range[k] if model.jnt_limited[k] and len(axes) == 1
                                 else (-np.inf, np.inf))
-                back = (Frame(p=-ref * axis) if one == PRISMATIC
+                back = (Frame(p=-ref * axis) if joint_type == PRISMATIC
                         else Frame(rotation_about(axis, -ref)))
                 joints[own] = Joint(
-                    own, one, parent, child, at @ Frame(np.eye(3), place) @ back, axis,
+                    own, joint_type, parent, child, at @ Frame(np.eye(3), place) @ back, axis,
                     float(lower), float(upper), effort=self._effort(k), start=ref or None,
                     **({} if len(axes) > 1 else self._own_forces(k)))
                 parent, at = child, Frame(np.eye(3), -place)

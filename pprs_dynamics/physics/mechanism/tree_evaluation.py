@@ -301,11 +301,11 @@ def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, A
     sizes = packed_tables(t).sizes
     m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
     m.q[0] = q
-    one = type(m)(*(array[0].data for array in m))
+    sample = type(m)(*(array[0].data for array in m))
     places = np.full((len(q), 2), -1)
     places[columns, 0] = np.arange(len(columns))
-    update_frame_placements(t, one)
-    residuals = np.array([residual(t, one, r) for r in range(len(t.rows))])
+    update_frame_placements(t, sample)
+    residuals = np.array([residual(t, sample, r) for r in range(len(t.rows))])
     J = np.zeros((len(t.rows), len(columns)))
-    jacobian(t, one, places, J, np.empty((len(J), 0)))
+    jacobian(t, sample, places, J, np.empty((len(J), 0)))
     return residuals, J, m

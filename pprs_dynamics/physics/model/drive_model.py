@@ -224,12 +224,12 @@ class DriveModel:
     @property
     def friction(self) -> DriveFriction:
         """The friction of its drives."""
-        return next(one for one in self.effects if isinstance(one, DriveFriction))
+        return next(effect for effect in self.effects if isinstance(effect, DriveFriction))
 
     @property
     def offset(self) -> DriveOffset:
         """The constant efforts of its drives."""
-        return next(one for one in self.effects if isinstance(one, DriveOffset))
+        return next(effect for effect in self.effects if isinstance(effect, DriveOffset))
 
     @property
     def title(self) -> str:
@@ -522,18 +522,18 @@ class DriveModel:
 
     def position_error(self, position: Array) -> Array:
         """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
-        errors = [one.position_error(self.drives, position) for one in self.misreadings]
+        errors = [e.position_error(self.drives, position) for e in self.misreadings]
         return np.sum(errors, axis=0) if errors else np.zeros_like(position)
 
     def loaded_position_error(self, transmitted: Array) -> Array:
         """Return the errors of measured positions by what gears pass on, (N, D)."""
-        errors = [one.loaded_position_error(self.drives, transmitted) for one in self.misreadings]
+        errors = [e.loaded_position_error(self.drives, transmitted) for e in self.misreadings]
         return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
         """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
-        errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
-                                for one in self.misreadings], axis=0)
+        errors: Array = np.sum([e.windup_error(self.drives, transmitted, windup)
+                                for e in self.misreadings], axis=0)
         return errors
 
 

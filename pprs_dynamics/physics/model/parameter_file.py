@@ -92,7 +92,7 @@ def other_nodes(text: str) -> dict[str, Any]:
     content = parse(text)
     chosen = _parameters_blocks('', content)
     return {node: block for node, block in content.items()
-            if not any(block['ros__parameters'] is one for one in chosen)}
+            if not any(block['ros__parameters'] is parameters for parameters in chosen)}
 
 
 def _parameters_blocks(path: object, content: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:

@@ -50,7 +50,7 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
         _, name, *rest = key.split('.')
         if find_effect(name) is None or not rest:
             raise UnknownNameError('key', key, [
-                f'{UNCERTAINTIES}.{one}' for one in active])
+                f'{UNCERTAINTIES}.{effect}' for effect in active])
         if name in active and f'effects.{name}.{".".join(rest)}' not in parameters:
             raise ModelError(key, value, f'belong to effects.{name}.{".".join(rest)}, which is '
                              'not there: take the line out')

@@ -34,7 +34,7 @@ def reference_files(values: Mapping[str, Any], source: str) -> tuple[ReferenceFi
 
 def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile]) -> dict[str, Any]:
     """Return values that name reference runs, in place of others."""
-    new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files]}
+    new = {REFERENCE: [str(file.path) for file in files], HASHES: [file.sha256 for file in files]}
     return {**{key: value for key, value in values.items() if key not in KEYS},
             **{key: value for key, value in new.items() if value}}
 

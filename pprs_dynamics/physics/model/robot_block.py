@@ -160,8 +160,8 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
             raise ModelError(f'robot.loops.{loop.name}', loop.kind, 'not stand in the file as '
                              'well as in the description')
     closures = (*description.loops, *(Loop(
-        name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
-        one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
+        name, loop['type'], loop['a.link'], Frame.of(loop['a.xyz'], loop['a.rpy']),
+        loop['b.link'], Frame.of(loop['b.xyz'], loop['b.rpy'])) for name, loop in loops.items()))
     return build_structure(description, base, tool, drives, closures, home, poses,
                            below(dict(own), LOCKED))
 
@@ -313,7 +313,7 @@ def _require_driven_bodies(robot: Mechanism) -> None:
         pushed[0, d] = 1.0
         rest = np.zeros_like(home)
         with not_compiling_yet():
-            moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
+            moved, still = (robot.torques(home, rest, state)[0, d] for state in (pushed, rest))
         if not moved - still + robot.armature[d] > 0:
             raise ModelError(DRIVES_KEY, name,
                              'move a body: no link that it moves has a mass')

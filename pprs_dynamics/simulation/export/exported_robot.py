@@ -88,8 +88,8 @@ def express(model: DriveModel, kind: str) -> Expressed:
     left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
             if not _take(joints, numbers, HELD[kind])]
     # Joints of a format that passive joints of the model are; those without do not turn alone.
-    passive = {one.name: (one.name,) if model.moves_joints else HINGES
-               for one in model.robot.passive_joints if one.has_position}
+    passive = {joint.name: (joint.name,) if model.moves_joints else HINGES
+               for joint in model.robot.passive_joints if joint.has_position}
     robot = model.robot
     for effect in model.effects:
         if effect.name not in model.values.get('effects.active', ()):

@@ -96,8 +96,8 @@ class EffortFilter(MeasurementEffect):
         if drive.time is None or len(drive.time) < 2:
             return (np.zeros_like(effort),)
         step = float(np.median(np.diff(drive.time)))
-        one = lag(effort, step, shape['time_constant'], effort[0], effort[0])
-        return (one - cls.sense(effort, drive, **shape),)
+        lagged = lag(effort, step, shape['time_constant'], effort[0], effort[0])
+        return (lagged - cls.sense(effort, drive, **shape),)
 
     @classmethod
     def drive_memory(cls) -> Any:

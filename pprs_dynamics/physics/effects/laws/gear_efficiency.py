@@ -68,4 +68,4 @@ class GearEfficiency(DriveEffect):
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what another exponent of the load adds, as to `load_friction`."""
-        return (tuple(other_exponent(drive.transmitted, one) for one in cls.columns(drive)),)
+        return (tuple(other_exponent(drive.transmitted, row) for row in cls.columns(drive)),)

@@ -114,7 +114,7 @@ class ModelJointFriction(Effect):
     name = 'passive_friction'
 
     def __init__(self, blocks: Mapping[str, Mapping[str, float]]) -> None:
-        self.blocks = {name: dict(one) for name, one in blocks.items()}
+        self.blocks = {name: dict(block) for name, block in blocks.items()}
         self._tables: dict[Reversal, Any] = {}
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:

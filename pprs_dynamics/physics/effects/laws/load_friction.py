@@ -64,4 +64,4 @@ class LoadFriction(DriveEffect):
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what another exponent of the load adds: 2/3 in Hertzian contacts."""
-        return (tuple(other_exponent(drive.friction_load, one) for one in cls.columns(drive)),)
+        return (tuple(other_exponent(drive.friction_load, row) for row in cls.columns(drive)),)
