@@ -126,10 +126,10 @@ def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:
     model, robot = axis(), axis({'drive_spring': {'stiffness': 300.0, 'position': 0.01}})
     runs = [axis_recording(robot, seed) for seed in (1, 2)]
     found = pprs_dynamics.diagnose(model, runs[0])
-    assert [one.name for one in found.effects] == ['drive_spring']
+    assert [effect.name for effect in found.effects] == ['drive_spring']
     answer = adopt(model, 'drive_spring', runs[0], runs[1])
     assert answer.adopted
-    before, after = (compare(one, runs[1]).rms for one in (model, answer.model))
+    before, after = (compare(tried, runs[1]).rms for tried in (model, answer.model))
     assert after < 0.3 * before
     for result in (found, answer):
         assert len(result.table())
@@ -147,7 +147,7 @@ def test_the_notebook_finds_what_was_hidden_and_the_error_falls(
         if cell['cell_type'] == 'code':
             exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
     (hidden,) = names['run'].effects
-    assert [(one.name, list(one.drives)) for one in names['found'].effects] == [
+    assert [(effect.name, list(effect.drives)) for effect in names['found'].effects] == [
         (hidden['name'], hidden['drives'])]
     assert names['answer'].adopted
     assert names['after'].rms < 0.7 * names['before'].rms

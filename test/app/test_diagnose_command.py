@@ -77,9 +77,9 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     for candidate in result['candidates']:
         assert set(candidate) == {'name', 'drives', 'evidence', 'error_after'}
     assert set(result['noise_floors']) == set(DRIVES)
-    assert [one['name'] for one in result['sets'][0]['effects']] == [HIDDEN]
+    assert [effect['name'] for effect in result['sets'][0]['effects']] == [HIDDEN]
     assert result['held_out_on'] == 'validation'
-    assert all(isinstance(one, str) for one in result['warnings'])
+    assert all(isinstance(warning, str) for warning in result['warnings'])
 
 
 def test_the_page_is_a_record_that_can_be_filed(folder: Path) -> None:

@@ -133,9 +133,9 @@ def test_robots_have_the_names_of_their_folders(tmp_path: Path) -> None:
     for name in ('r1/a.csv', 'r2/b.csv', 'r3/bag/metadata.yaml', 'r3/bag/0.mcap', 'r3/x.txt'):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text('x')
-    found = [(Path(one.path).name, one.robot) for one in find_recordings([str(tmp_path)])]
+    found = [(Path(run.path).name, run.robot) for run in find_recordings([str(tmp_path)])]
     assert found == [('a.csv', 'r1'), ('b.csv', 'r2'), ('bag', 'r3')]
-    assert [one.robot for one in find_recordings([f'{tmp_path}/r[12]/*.csv'])] == ['r1', 'r2']
+    assert [run.robot for run in find_recordings([f'{tmp_path}/r[12]/*.csv'])] == ['r1', 'r2']
     for name in ('', str(tmp_path / 'none*')):
         with pytest.raises(UnreadableFileError, match='there is no recording'):
             list(find_recordings([name]))
@@ -189,7 +189,7 @@ def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(
     rows = pandas.read_parquet(store)
     assert dict(zip(rows.recording, rows.verdict, strict=True)) == {
         'right.csv': 'adequate', 'worn.csv': 'effect'}
-    (trend,) = (one for one in fleet_trends(str(store)).trends if one.parameter == 'force')
+    (trend,) = (course for course in fleet_trends(str(store)).trends if course.parameter == 'force')
     value, = rows[rows.effect == 'coulomb_friction'].value
     assert sorted(trend.value) == [0.0, value]
     assert abs(value - 6.0) < 0.5

@@ -194,6 +194,6 @@ def test_modules_do_what_they_say(name: str) -> None:
 
 
 @needs_node
-@pytest.mark.parametrize('file', sorted(one.name for one in MODULE_FOLDER.glob('*js')))
+@pytest.mark.parametrize('file', sorted(script.name for script in MODULE_FOLDER.glob('*js')))
 def test_each_script_is_one(file: str) -> None:
     assert node('--check', MODULE_FOLDER / file).returncode == 0

@@ -86,9 +86,9 @@ def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
     time = np.arange(100_000.0)
     first, second = np.zeros(100_000), np.zeros(100_000)
     first[40_000], second[70_001] = 3.0, -4.0
-    times, one, other = thinned(time, first, second)
-    assert len(times) == len(one) == len(other) <= 3000
-    assert one.max() == 3.0
+    times, curve, other = thinned(time, first, second)
+    assert len(times) == len(curve) == len(other) <= 3000
+    assert curve.max() == 3.0
     assert other.min() == -4.0
 
 
@@ -145,7 +145,7 @@ def test_errors_of_two_models_on_one_recording(
                  '--report', 'both.html']) == 0
     content = json.loads((two_models / 'both.json').read_text())
     assert content['beside']['name'] == beside
-    before, after = (one['drives']['slide_1']['rms'] for one in (content, content['beside']))
+    before, after = (side['drives']['slide_1']['rms'] for side in (content, content['beside']))
     assert before == pytest.approx(OFFSET, rel=0.05)
     assert after < 0.1
     assert beside in capsys.readouterr().out

@@ -52,7 +52,7 @@ def test_friction_of_one_passive_joint_is_named_and_adopted(tmp_path: Path) -> N
     answer, model = tmp_path / 'why.json', tmp_path / 'with.yaml'
     assert main(['diagnose', str(run), '--model', HEXAPOD, '--json', str(answer)]) == 0
     found = json.loads(answer.read_text())['effects']
-    assert [one['name'] for one in found] == ['joint_friction']
+    assert [effect['name'] for effect in found] == ['joint_friction']
     torque = found[0]['parameters'][key]
     assert torque['std'] < 0.03 * hidden
     assert abs(torque['value'] - hidden) < 3 * torque['std']

@@ -43,8 +43,8 @@ def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> N
             answer = bench.post('/api/open', name=f'0/{name}')
             assert answer.status == 200, answer.body
         screen = bench.screen()
-        assert [one['name'] for one in screen['recordings']] == ['first.mcap', 'plain.csv']
-        assert [one['name'] for one in screen['held_out']] == ['other.mcap']
+        assert [run['name'] for run in screen['recordings']] == ['first.mcap', 'plain.csv']
+        assert [run['name'] for run in screen['held_out']] == ['other.mcap']
 
 
 def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder: Path) -> None:

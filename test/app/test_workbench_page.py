@@ -58,7 +58,7 @@ def page(browser: Any, bench: Workbench) -> Iterator[Page]:
 
 
 def errors(state: dict[str, Any]) -> dict[str, float]:
-    return {name: one['now'] for name, one in state['errors'].items()}
+    return {name: error['now'] for name, error in state['errors'].items()}
 
 
 def test_the_page_loads_under_its_own_policy(browser: Any, bench: Workbench) -> None:
@@ -139,7 +139,7 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
 def test_a_file_that_is_dropped_is_opened_and_one_that_is_none_is_a_sentence(
     page: Page, folder: Path,
 ) -> None:
-    names = [one['name'] for one in page.settled()['recordings']]
+    names = [recording['name'] for recording in page.settled()['recordings']]
     dropped = write_hidden(folder / 'dropped.csv', 3, 8.0)
     drop = '''([name, text]) => { const files = new DataTransfer();
         files.items.add(new File([text], name));
@@ -149,7 +149,7 @@ def test_a_file_that_is_dropped_is_opened_and_one_that_is_none_is_a_sentence(
     page.tab.locator('#message', has_text='words.csv').wait_for()
     page.tab.evaluate(drop, [dropped.name, dropped.read_text()])
     page.tab.wait_for_function(f'bench.state.recordings.length === {len(names) + 1}')
-    assert [one['name'] for one in page.settled()['recordings']] == [*names, 'dropped.csv']
+    assert [run['name'] for run in page.settled()['recordings']] == [*names, 'dropped.csv']
 
 
 def test_all_is_done_by_keyboard(page: Page) -> None:

@@ -75,7 +75,7 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     assert abs(force.value - FORCE) < 4 * force.std < 0.1 * FORCE
     assert abs(mass.value - MASS) < 4 * mass.std < 0.1 * MASS
     assert min(terms.total for terms in shown.without.values()) > 100
-    told = next(one for one in session.to_dict()['effects'] if one['name'] == 'payload_mass')
+    told = next(row for row in session.to_dict()['effects'] if row['name'] == 'payload_mass')
     assert told['evidence'] == pytest.approx(shown.without['payload_mass'].total)
     assert told['evidence_terms'].startswith('fit +')
     # Noise is shown once the diagnosis has estimated it.
@@ -120,17 +120,17 @@ def test_a_value_that_is_typed_holds_and_costs_what_it_departs(session: Session)
 def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session) -> None:
     lifts = session.shares(2.0, 6.0, ['lift_1', 'lift_3'])
     assert lifts[0].net > 0.8
-    assert 'payload_mass' in {one.effect for one in lifts if one.net > 0.9 * lifts[0].net}
+    assert 'payload_mass' in {lift.effect for lift in lifts if lift.net > 0.9 * lifts[0].net}
     session.ticks.tick('payload_mass')
     session.ticks.settle()
     of_lift_2 = session.shares(2.0, 6.0, ['lift_2'])
     assert of_lift_2[0].effect in ('coulomb_friction', 'asymmetric_friction', 'load_friction')
     assert of_lift_2[0].net > 0.8
-    assert all(one.net <= max(one.explained, 0.0) + 1e-12 for one in of_lift_2)
+    assert all(gain.net <= max(gain.explained, 0.0) + 1e-12 for gain in of_lift_2)
     session.ticks.tick('coulomb_friction', ['lift_2'])
     session.ticks.settle()
     # Nothing is left to be explained: what fits to noise does not pay.
-    assert all(one.net < 0.05 for one in session.shares(2.0, 6.0))
+    assert all(share.net < 0.05 for share in session.shares(2.0, 6.0))
 
 
 def test_bad_requests_are_a_sentence_and_change_nothing(session: Session) -> None:
@@ -233,8 +233,8 @@ def test_work_apart_answers_fails_and_is_ended() -> None:
 
 
 def ticked(session: Session) -> dict[str, Any]:
-    return {name: (one.best.drives, dict(one.chosen))
-            for name, one in session.ticks.view.ticks.items()}
+    return {name: (tick.best.drives, dict(tick.chosen))
+            for name, tick in session.ticks.view.ticks.items()}
 
 
 def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> None:

@@ -165,7 +165,7 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     run = read_recording(path, given.recorded)
     found = diagnose(given, [run])
     assert found.verdict == 'adequate'
-    after = {one.label: one.after for one in found.calibrated}
+    after = {number.label: number.after for number in found.calibrated}
     assert after['robot.gain[2]'] == pytest.approx(4.0, rel=0.01)
 
 
@@ -205,7 +205,7 @@ def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
         assert main(['diagnose', str(tmp_path / 'loaded.csv'), '--model', base, '--json',
                      str(told)]) == 0
         answer = json.loads(told.read_text())
-        found = {one['name'] for one in answer['effects']}
+        found = {effect['name'] for effect in answer['effects']}
         assert ('payload_mass' in found) != hides
-        assert any(warning in one for one in answer['warnings']) == hides
+        assert any(warning in text for text in answer['warnings']) == hides
         assert (warning in capsys.readouterr().out) == hides

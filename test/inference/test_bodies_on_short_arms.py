@@ -50,7 +50,7 @@ def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_pa
     true = with_effects(model, {'payload_mass': {'mass': 0.5, 'z': -0.5}})
     recording = record(true)
     found = diagnose(model, [recording])
-    assert [one.name for one in found.effects] == ['payload_mass']
+    assert [effect.name for effect in found.effects] == ['payload_mass']
     said = found.effects[0].parameters
     assert abs(said['mass'].value * said['z'].value + 0.25) < 0.01
     adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
@@ -151,7 +151,7 @@ def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
     real = replace(real, robot=real.robot.with_body(
         link, body_at(MASS, tuple(centre + away), np.zeros((3, 3)))))
     design = Design.of(arm.real_arm(tmp_path), [arm.record(real, arm.motion(20.0), 0.01)])
-    term = next(one for one in design.structure if one.effect is kind)
+    term = next(t for t in design.structure if t.effect is kind)
     found = find_centre(term, f'{prefix}mass', design.residuals.error,
                         dict.fromkeys(range(3), 1.0), design.given)
     assert found == pytest.approx(away, abs=0.02)

@@ -32,19 +32,19 @@ POSITION, EFFORT = FORCES.mechanism.position, FORCES.total + NOISE
 
 def told(position: Any = POSITION, effort: Any = EFFORT) -> list[OtherReading]:
     found = find_mistakes(MODEL, Recording.from_arrays('r', TIME, position, None, effort))
-    return [one for one in found if isinstance(one, OtherReading)]
+    return [finding for finding in found if isinstance(finding, OtherReading)]
 
 
 def test_efforts_without_a_sign_are_told() -> None:
-    one, = told(effort=np.abs(EFFORT))
+    finding, = told(effort=np.abs(EFFORT))
     # Lifts bear the weight and never change their sign: theirs may be either.
-    assert one.kind == 'effort_absolute'
-    assert one.drives == ('slide_1', 'slide_2', 'slide_3')
-    assert 'absolute value' in one.text
+    assert finding.kind == 'effort_absolute'
+    assert finding.drives == ('slide_1', 'slide_2', 'slide_3')
+    assert 'absolute value' in finding.text
 
 
 def test_positions_that_change_to_millimetres_are_in_another_unit() -> None:
-    assert any('millimetres' in one.text for one in told(position=POSITION * np.where(
+    assert any('millimetres' in finding.text for finding in told(position=POSITION * np.where(
         AFTER, 1e3, 1.0)))
 
 

@@ -53,7 +53,7 @@ def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: DriveModel) -> Non
     fits = FittedSets(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
     found = [fits.refined(fits.evaluate((EffectCandidate.of([component]),)))
              for component in fits.components.structure]
-    best = min(found, key=lambda one: one.cost)
+    best = min(found, key=lambda fitted: fitted.cost)
     (candidate,) = best.effects
     assert candidate.placed_name == 'link_mass:back_link'
     assert candidate.effect.places_of(candidate.components[0].names) == (

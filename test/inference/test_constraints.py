@@ -103,9 +103,9 @@ def nearest_body(robot: Mechanism, component: Component, c: Array, covariance: A
     sign = 1.0 if c[0] >= 0 else -1.0
     doubted = abs(c[0]) < DOUBTED * covariance[0, 0] ** 0.5
     found = [nearest(c, covariance, Inequalities.none(len(c)),
-                     body_planes(robot, component, one))
-             for one in ((sign, -sign) if doubted else (sign,))]
-    best = min((one for one in found if one is not None), key=lambda one: one.rise)
+                     body_planes(robot, component, side))
+             for side in ((sign, -sign) if doubted else (sign,))]
+    best = min((n for n in found if n is not None), key=lambda n: n.rise)
     return best.coefficients, best.rise
 
 
@@ -116,8 +116,8 @@ def least_extents(robot: Mechanism, component: Component, c: Array) -> tuple[flo
     """
     effect = component.effect.at(dict(zip(  # type: ignore[attr-defined]
         component.names, c, strict=True)))
-    after, before = (pseudo_inertia(one.inertial[one.carrier])
-                     for one in (effect.changed(robot), robot))
+    after, before = (pseudo_inertia(robot_.inertial[robot_.carrier])
+                     for robot_ in (effect.changed(robot), robot))
     added = np.sign(c[0]) * (after - before)
     return float(np.linalg.eigvalsh(added)[0]), float(np.linalg.eigvalsh(after)[0])
 

@@ -214,7 +214,7 @@ def arm_recording(model: DriveModel, motion: float | list[float] = 1.0,
 def read_as_told(model: DriveModel, folder: Path, run: Recording,
                  ) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
-    readings = [one for one in find_mistakes(model, run) if isinstance(one, OtherReading)]
+    readings = [m for m in find_mistakes(model, run) if isinstance(m, OtherReading)]
     line = columns_line(readings)
     write_recording(folder / 'run.csv', run)
     path = folder / 'corrected.yaml'
@@ -271,4 +271,4 @@ def test_recordings_of_other_people(case: str) -> None:
     part = slice(len(whole.time) // 3, None)
     piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
                                   whole.effort[part], model.drives)
-    expect([one.what for one in find_mistakes(model, piece)], [clause] * bool(clause))
+    expect([mistake.what for mistake in find_mistakes(model, piece)], [clause] * bool(clause))

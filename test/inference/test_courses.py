@@ -109,6 +109,6 @@ def test_what_sensors_begin_to_do_has_a_date_its_own_name_and_its_own_shape(
     found = diagnose(arm, [Recording.from_arrays(
         'half', ARM_TIME, moved.position, None, effort, arm.drives, {'temperature': WARMTH})])
     assert found.verdict == 'effect'
-    assert [one.name for one in found.effects] == [name]
+    assert [effect.name for effect in found.effects] == [name]
     assert found.to_dict()['effects'][0]['since'] == pytest.approx(15.0, abs=0.2)
     assert found.effects[0].parameters[key].value == pytest.approx(value, abs=tolerance)

@@ -82,7 +82,7 @@ def test_columns_of_drives_are_what_the_model_with_the_effect_says(
     rows = design.drive_rows(effect, 4, shape)
     every = {p.name: values.get(p.name, p.default or 0.0) for p in effect.parameters}
     c = effect.to_coefficients(every)
-    weights = np.array([c[one.name] for one in effect.coefficients] or [1.0])
+    weights = np.array([c[coefficient.name] for coefficient in effect.coefficients] or [1.0])
     found = change(design, name, values, DRIVES[4])
     expected = weights @ rows
     np.testing.assert_allclose(found[:, 4], expected, atol=1e-3 * np.abs(expected).max())
@@ -93,10 +93,10 @@ def test_columns_of_drives_are_what_the_model_with_the_effect_says(
 def test_delays_are_tried_around_the_one_that_the_efforts_show(late: float) -> None:
     run = record(MODEL)
     step = float(np.median(np.diff(run.time)))
-    effort = np.stack([np.interp(run.time - late, run.time, one) for one in run.effort.T], axis=1)
+    effort = np.stack([np.interp(run.time - late, run.time, row) for row in run.effort.T], axis=1)
     found = Design.of(MODEL, [replace(run, effort=effort)]).covered[2]
     assert found.delay == pytest.approx(late, abs=2 * step)
-    tried = np.array([one['delay'] for one in TimeDelay.trials(found)])
+    tried = np.array([trial['delay'] for trial in TimeDelay.trials(found)])
     assert np.all(tried)  # none is no delay
     assert tried.min() < late < tried.max()
     assert np.abs(tried[tried != 0] - late).min() <= 0.001
@@ -120,7 +120,7 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
         number = found[label].number
         value = MODEL.values[key]
         moved = (value + number.deviation if element is None else tuple(
-            one + number.deviation * (k == element) for k, one in enumerate(value)))
+            x + number.deviation * (k == element) for k, x in enumerate(value)))
         with_it, _ = measure_residuals(DriveModel.from_parameters(
             {**MODEL.values, key: moved}), [record(MODEL)])
         expected = with_it.model - design.residuals.model
@@ -136,11 +136,11 @@ def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     series = JointSeries(up_and_down, np.array((*HOME, 0.0, 0.0, 0.0)), TIME[-1], 3)
     found = diagnose(MODEL, [record(true, 0.08,
                                     motion=lambda time: platform_motion(series, time))])
-    assert [one.name for one in found.effects] == ['base_tilt']
+    assert [effect.name for effect in found.effects] == ['base_tilt']
     assert found.effects[0].parameters['x'].value == pytest.approx(0.045, abs=5e-4)
     assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)
-    assert any('slide_1, slide_2 and slide_3 hardly moved' in one for one in found.warnings)
-    assert not any('independent samples' in one for one in found.warnings)
+    assert any('slide_1, slide_2 and slide_3 hardly moved' in warning for warning in found.warnings)
+    assert not any('independent samples' in warning for warning in found.warnings)
 
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:
@@ -199,7 +199,7 @@ def test_a_drive_that_reverses_in_another_width_hides_no_friction() -> None:
         np.sqrt(np.nanmean(measure_residuals(found.adopted, [other])[0].error ** 2)), rel=1e-6)
     assert effect_found.held_out_after < 0.5 * effect_found.held_out_before
     # The width stays as in the model, which the answer says.
-    assert any('slide_1 seems to reverse' in one for one in found.warnings)
+    assert any('slide_1 seems to reverse' in warning for warning in found.warnings)
 
 
 @pytest.mark.filterwarnings('error')
@@ -210,5 +210,5 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     recording = record(late, 0.05)
     recording.effort[:, 2] = np.nan
     found = diagnose(MODEL, [recording])
-    assert {one.name for one in found.effects} == {'time_delay', 'viscous_friction'}
-    assert 'slide_3' not in {drive for one in found.effects for drive in one.drives}
+    assert {effect.name for effect in found.effects} == {'time_delay', 'viscous_friction'}
+    assert 'slide_3' not in {drive for effect in found.effects for drive in effect.drives}

@@ -128,7 +128,7 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
                    time=time)
     for recording in (first, other):
         found = diagnose(read, [recording])
-        assert (found.verdict, [one.name for one in found.effects]) == ('adequate', [])
+        assert (found.verdict, [effect.name for effect in found.effects]) == ('adequate', [])
 
 
 def test_adopt_sets_what_is_otherwise_and_the_way_back_is_exact() -> None:

@@ -53,7 +53,7 @@ def test_the_loop_lowers_the_error_on_a_run_that_it_never_saw() -> None:
     model = DriveModel.load(MODEL)
     diagnosis = diagnose(model, [run])
     # Of all candidates the published effect lowers the error by far the most, from 4.1 to 3.1 %.
-    assert min(diagnosis.candidates, key=lambda one: one.error_after).name == 'asymmetric_friction'
+    assert min(diagnosis.candidates, key=lambda c: c.error_after).name == 'asymmetric_friction'
     walk = adopt_all(model, [run], diagnosis=diagnosis)
     assert 'asymmetric_friction' in [step.effect for step in walk.adopted]
     assert real_drive.error_of(model, pulses) > 5.9

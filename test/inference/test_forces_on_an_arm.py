@@ -43,13 +43,13 @@ def diagnosed(folder: Path, force: Force, moved: JointMotion = MOVED,
 
 
 def named(found: Diagnosis) -> list[tuple[str, tuple[str, ...] | None]]:
-    return [(one.name, one.drives) for one in found.effects]
+    return [(effect.name, effect.drives) for effect in found.effects]
 
 
 def values(found: Diagnosis) -> dict[str, float]:
     """Return the values of all effects, which are on one joint, by parameter."""
-    return {key.split('.')[1]: one.value for effect in found.effects
-            for key, one in effect.parameters.items()}
+    return {key.split('.')[1]: parameter.value for effect in found.effects
+            for key, parameter in effect.parameters.items()}
 
 
 def rubber(side: float) -> Force:
@@ -149,7 +149,7 @@ def test_friction_by_load_needs_another_load(acceleration: float, warns: bool) -
     model = DriveModel.from_parameters(axis_values(20.0, 100.0, 20.0, gravity=-9.81))
     time, w = np.arange(0, 30, 0.01), 2 * np.pi * 0.4 * np.array([1.0, 0.37])
     phase, size = w * time[:, None], acceleration / w[0] ** 2
-    q, v, a = (size * one.sum(axis=1, keepdims=True) for one in (
+    q, v, a = (size * wave.sum(axis=1, keepdims=True) for wave in (
         np.sin(phase), w * np.cos(phase), -w ** 2 * np.sin(phase)))
     force = model.drive_forces(JointMotion(q, v, a, time)).total
     force = force + 0.08 * np.abs(20.0 * (a + 9.81)) * np.tanh(v / 0.001)

@@ -129,8 +129,8 @@ def test_a_block_gains_what_an_error_in_it_loses_over_the_noise() -> None:
     error = noise.copy()
     error[400:600, 1] += 0.2 * np.sign(rng.normal(size=200))  # of no colour, in the third block
     # The last drive was measured for 99 samples: too few to count.
-    for one in (error, noise):
-        one[99:, 2] = np.nan
+    for series in (error, noise):
+        series[99:, 2] = np.nan
     found = predictive_gain(residuals_of(error), residuals_of(noise))
     assert found.gains.shape == found.sizes.shape == (BLOCKS, 3)
     expected = float(np.sum(error[400:600, 1] ** 2 - noise[400:600, 1] ** 2)) / 0.05 ** 2
@@ -172,7 +172,7 @@ def test_only_a_wrong_sign_in_doubt_is_cheap() -> None:
     assert sum(odds) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize('effect', SIGNED, ids=lambda one: one.name)
+@pytest.mark.parametrize('effect', SIGNED, ids=lambda case: case.name)
 def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> None:
     names = tuple(c.name for c in effect.coefficients)
     component = Component(effect, 0 if issubclass(effect, DriveEffect) else None, names)

@@ -133,7 +133,7 @@ def everything() -> list[EffectCandidate]:
 
 
 def sets_of(found: CandidateSet) -> set[tuple[str, tuple[int, ...] | None]]:
-    return {(one.name, one.drives) for one in found.effects}
+    return {(effect.name, effect.drives) for effect in found.effects}
 
 
 SPACES = [
@@ -155,8 +155,8 @@ def test_the_search_ends_at_the_best_of_all_sets(
     best = exhaustive.evaluate(())
     for size in range(1, max(len(truth), 2) + 1):
         for chosen in combinations(every, size):
-            if len({one.name for one in chosen}) == size:
-                best = min(best, exhaustive.evaluate(chosen), key=lambda one: one.cost)
+            if len({candidate.name for candidate in chosen}) == size:
+                best = min(best, exhaustive.evaluate(chosen), key=lambda fitted: fitted.cost)
     assert found.cost <= best.cost + 1e-6
     assert sets_of(found) == sets_of(best)
     assert {name for name, _ in sets_of(found)} == {name for name, _ in truth}
@@ -173,10 +173,10 @@ def test_costs_do_not_depend_on_what_was_fitted_before() -> None:
     for _ in range(3):
         other = FittedSets(design, DECISIONS)
         for k in rng.permutation(len(visited)):
-            one = visited[k]
-            order = rng.permutation(len(one.candidates))
-            again = other.evaluate(tuple(one.candidates[place] for place in order))
-            assert again.cost == pytest.approx(one.cost, abs=1e-9, rel=1e-12)
+            fitted = visited[k]
+            order = rng.permutation(len(fitted.candidates))
+            again = other.evaluate(tuple(fitted.candidates[place] for place in order))
+            assert again.cost == pytest.approx(fitted.cost, abs=1e-9, rel=1e-12)
 
 
 @pytest.mark.parametrize('number', range(4))
@@ -187,10 +187,10 @@ def test_an_effect_alone_is_on_the_drives_where_it_costs_least(number: int) -> N
     search = Search(FittedSets(random_design(truth, 20 + number), DECISIONS))
     search.run()
     for effect in ON_DRIVES:
-        alone = [one.cost for one in search.fits.sets
-                 if len(one.candidates) == 1 and one.effects[0].effect is effect]
-        exhaustive = [search.fits.evaluate((one,)).cost for one in everything()
-                      if one.effect is effect]
+        alone = [fitted.cost for fitted in search.fits.sets
+                 if len(fitted.candidates) == 1 and fitted.effects[0].effect is effect]
+        exhaustive = [search.fits.evaluate((candidate,)).cost for candidate in everything()
+                      if candidate.effect is effect]
         # A tenth of what rivals may differ by.
         assert not alone or min(alone) <= min(exhaustive) + DECISIONS.rival_margin / 10
 
@@ -199,7 +199,7 @@ def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prior_costs() -> N
     design = random_design({('structure_0', None): 0.4, ('drive_1', 1): -0.5}, 12)
     fits = FittedSets(design, DECISIONS)
     structure, on_drives = everything()[0], next(
-        one for one in everything() if one.name == 'drive_1' and one.drives == (0, 2))
+        c for c in everything() if c.name == 'drive_1' and c.drives == (0, 2))
     for candidates in ((), (structure,), (structure, on_drives)):
         found = fits.evaluate(candidates)
         terms = found.terms.to_dict()
@@ -223,11 +223,11 @@ def tabulated(number: int, barred: str = '') -> tuple[ModelTable, Costs]:
     fits = FittedSets(random_design(TWO, number), DECISIONS)
     fits.form_errors = SimpleNamespace(  # type: ignore[assignment]
         reason=lambda fitted, covariance: (
-            'form' * (barred in {one.name for one in fitted.effects}), None))
+            'form' * (barred in {effect.name for effect in fitted.effects}), None))
     costs: Costs = {}
     for size in range(3):
         for chosen in combinations(everything(), size):
-            names = frozenset(one.name for one in chosen)
+            names = frozenset(candidate.name for candidate in chosen)
             if len(names) == size:
                 fitted = fits.evaluate(chosen)
                 if barred not in names:
@@ -236,7 +236,7 @@ def tabulated(number: int, barred: str = '') -> tuple[ModelTable, Costs]:
 
 
 def named(table: ModelTable) -> frozenset[str]:
-    return frozenset(one.name for one in table.best.effects)
+    return frozenset(effect.name for effect in table.best.effects)
 
 
 @pytest.mark.parametrize('number', [0, 2, 3])
@@ -250,7 +250,7 @@ def test_the_table_has_one_row_for_each_choice_of_effects(number: int) -> None:
         without = min(cost for names, cost in costs.items() if effect.name not in names)
         assert table.evidence(effect) == pytest.approx(without - costs[best])
         assert effect.name not in table.without(effect).placed_names
-    assert {name: one.cost for name, one in table.alone.items()} == {
+    assert {name: row.cost for name, row in table.alone.items()} == {
         name: cost for names, cost in costs.items() if len(names) == 1 for name in names}
 
 
@@ -261,11 +261,11 @@ def test_rivals_and_suspects_are_rows_within_a_margin(number: int, margin: float
     best = named(table)
     near = {names: cost - costs[best] for names, cost in costs.items()
             if names != best and cost <= costs[best] + margin}
-    rivals = {frozenset(one.row.placed_names): (set(one.missing), set(one.instead))
-              for one in table.rivals(margin)}
+    rivals = {frozenset(rival.row.placed_names): (set(rival.missing), set(rival.instead))
+              for rival in table.rivals(margin)}
     assert rivals == {names: (set(best - names), set(names - best)) for names in near
                       if best - names and names - best}
-    assert {one.name for one, _ in table.suspects(margin)} == {
+    assert {suspect.name for suspect, _ in table.suspects(margin)} == {
         name for names in near if best < names and len(names) == len(best) + 1
         for name in names - best}
 
@@ -275,12 +275,12 @@ def test_inadmissible_sets_near_the_best_are_listed_and_never_rows(number: int) 
     barred, (strongest, _) = {}, TWO
     table, costs = tabulated(number, strongest[0])
     for fitted in table.first.sets:
-        if strongest[0] in {one.name for one in fitted.effects}:
+        if strongest[0] in {effect.name for effect in fitted.effects}:
             barred[fitted] = fitted.total - min(costs.values())
     for margin in (-20.0, 0.0, 10.0):
         found = table.barred(margin)
         assert set(found) == {fitted for fitted, above in barred.items() if above < margin}
-        assert [one.total for one in found] == sorted(one.total for one in found)
+        assert [fitted.total for fitted in found] == sorted(fitted.total for fitted in found)
     assert any(0 < above < 10 for above in barred.values())
     assert not any(strongest[0] in row.placed_names for row in table.rows)
 
@@ -305,13 +305,13 @@ def test_a_set_costs_no_more_than_with_its_form_error(number: int) -> None:
         for _ in range(2))
 
     def reason(fitted: CandidateSet, covariance: Array) -> tuple[str, Candidates | None]:
-        form = next((one for one in fitted.effects if one.name == 'structure_4'), None)
+        form = next((effect for effect in fitted.effects if effect.name == 'structure_4'), None)
         return ('form', fitted.without(form)) if form else ('', None)
     fits.form_errors = SimpleNamespace(reason=reason)  # type: ignore[assignment]
     found = Search(fits).run()
     assert found.is_admissible
     assert 'structure_4' not in {name for name, _ in sets_of(found)}
-    form, larger, smaller = (next(one for one in everything() if one.name == name) for name in (
+    form, larger, smaller = (next(c for c in everything() if c.name == name) for name in (
         'structure_4', 'structure_3', 'drive_1'))
     for other in (larger, smaller):
         fits.evaluate((other, form))

@@ -79,8 +79,8 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     fits = FittedSets(Design.of(bare, [recorded(effort)]), DECISIONS)
     both = Component.of(catalogue()['asymmetric_friction'], 0, {},
                         ('force_forward', 'force_backward'))
-    one = Component.of(catalogue()['asymmetric_friction'], 0, {}, ('force_forward',))
-    held, without = (fits.evaluate((EffectCandidate.of([c]),)) for c in (both, one))
+    component = Component.of(catalogue()['asymmetric_friction'], 0, {}, ('force_forward',))
+    held, without = (fits.evaluate((EffectCandidate.of([c]),)) for c in (both, component))
     assert held.coefficients(both)[1] == pytest.approx(0, abs=1e-9)
     assert held.coefficients(both)[0] == pytest.approx(COULOMB, rel=0.05)
     assert without.cost < held.cost
@@ -117,7 +117,7 @@ def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     doubled = recorded(1.9 * MODEL.drive_forces(axis_motion(TIME)).total)
     found = diagnose(loose, [doubled])
     assert found.effects
-    assert not [one for one in found.effects if one.name == 'effort_gain']
+    assert not [effect for effect in found.effects if effect.name == 'effort_gain']
     fits = FittedSets(Design.of(loose, [doubled]), DECISIONS)
     component = Component.of(catalogue()['effort_gain'], 0, {}, ('gain',))
     alone = fits.evaluate((EffectCandidate.of([component]),))
@@ -135,7 +135,7 @@ def test_a_late_effort_is_found_without_an_impossible_gain() -> None:
     model, recording = shared_case('kuka_lag', 'j4.yaml', 'j4_1_half.csv.gz')
     found = diagnose(model, [recording])
     assert found.verdict == 'unknown'
-    names = {one.name for one in found.effects}
+    names = {effect.name for effect in found.effects}
     assert names & {'effort_filter', 'time_delay'}
     assert 'effort_gain' not in names
     words, command = next_step(found, PLACEHOLDERS)
@@ -145,7 +145,7 @@ def test_a_late_effort_is_found_without_an_impossible_gain() -> None:
 
 def test_a_gain_that_a_drive_may_have_is_one() -> None:
     found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(axis_motion(TIME)).total)])
-    assert [one.name for one in found.effects] == ['effort_gain']
+    assert [effect.name for effect in found.effects] == ['effort_gain']
     assert found.effects[0].parameters['axis.gain'].value == pytest.approx(0.2, abs=0.02)
 
 
@@ -161,5 +161,5 @@ def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path, seed: int)
         assert root_mean_square(found.remaining) < root_mean_square(found.residuals.error)
     else:
         assert found.verdict == 'unknown'
-        assert any(one.objection for one in found.unconfirmed)
-    assert all(one.cost >= 0 for one in found.sets)
+        assert any(effect.objection for effect in found.unconfirmed)
+    assert all(row.cost >= 0 for row in found.sets)

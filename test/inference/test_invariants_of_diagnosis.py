@@ -55,12 +55,12 @@ def diagnosed(name: str, *seeds: int) -> Diagnosis:
 
 
 def answer(found: Diagnosis) -> tuple[str, list[tuple[str, tuple[str, ...] | None]]]:
-    return found.verdict, [(one.name, one.drives) for one in found.effects]
+    return found.verdict, [(effect.name, effect.drives) for effect in found.effects]
 
 
 def possible(found: Diagnosis) -> set[str]:
     """Return the names of the reported effects and of their rivals."""
-    return {one.name for one in found.effects}.union(*found.indistinguishable)
+    return {effect.name for effect in found.effects}.union(*found.indistinguishable)
 
 
 def table_of(found: Diagnosis) -> ModelTable:
@@ -75,14 +75,14 @@ def test_what_is_hidden_is_reported_with_its_values_and_nothing_else(name: str) 
     assert possible(found) >= set(HIDDEN[name])
     assert len(found.effects) == len(HIDDEN[name])
     # What lowers the error most comes first, of the reported effects and of those tried alone.
-    shares, evidence = ([one.share for one in found.effects],
-                        [one.evidence for one in found.candidates])
+    shares, evidence = ([effect.share for effect in found.effects],
+                        [candidate.evidence for candidate in found.candidates])
     assert shares == sorted(shares, reverse=True)
     assert evidence == sorted(evidence, reverse=True)
-    for one in found.effects:
-        assert one.course is None
-        for key, value in HIDDEN[name].get(one.name, {}).items():
-            estimate = one.parameters[f'{AXIS}.{key}']
+    for effect in found.effects:
+        assert effect.course is None
+        for key, value in HIDDEN[name].get(effect.name, {}).items():
+            estimate = effect.parameters[f'{AXIS}.{key}']
             assert abs(estimate.value - value) < 4 * estimate.std < 0.6 * abs(value), key
 
 
@@ -90,10 +90,10 @@ def test_what_is_hidden_is_reported_with_its_values_and_nothing_else(name: str) 
 def test_reported_effects_lower_the_error_held_out_too(name: str) -> None:
     found, run = diagnosed(name, 1), recorded(name, 1)
     other = diagnose(axis(), [run], [recorded(name, 2)])  # a motion that the search has not seen
-    for one in (*found.effects, *other.effects):
-        assert one.held_out_after < one.held_out_before
-        assert one.error_after < one.error_before
-        assert one.evidence > 0
+    for effect in (*found.effects, *other.effects):
+        assert effect.held_out_after < effect.held_out_before
+        assert effect.error_after < effect.error_before
+        assert effect.evidence > 0
     # Without the forces of all effects is the error of the input model, as no number of it moved.
     error = found.to_dict()['refit']
     assert error['error_after'] == pytest.approx(error['error_before'], rel=1e-4)
@@ -112,7 +112,7 @@ def test_where_the_error_is_above_the_noise_nothing_is_advised_for_adoption() ->
     friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
     row = Row(fits, fits.evaluate(fitted.without(friction)), 0.0)
     found = Answer(table, row, ()).diagnosis()
-    assert [one.name for one in found.effects] == ['drive_inertia']
+    assert [effect.name for effect in found.effects] == ['drive_inertia']
     assert found.above_noise[AXIS] > 0.9 * np.std(found.remaining) / NOISE > 5
     assert found.verdict == 'unknown'
     assert next_step(found, GivenFiles(('run.csv',)))[1].startswith('pprs diagnose run.csv')
@@ -121,7 +121,7 @@ def test_where_the_error_is_above_the_noise_nothing_is_advised_for_adoption() ->
 @pytest.mark.parametrize('name', HIDDEN)
 def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -> None:
     found = diagnosed(name, 1)
-    table, costs = table_of(found), [one.cost for one in found.sets]
+    table, costs = table_of(found), [row.cost for row in found.sets]
     assert table.best.cost == min(row.cost for row in table.rows)
     assert all(row.is_exact for row in table.rows
                if row.cost < table.best.cost + DECISIONS.rival_margin)
@@ -131,8 +131,8 @@ def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -
     assert costs[0] == 0
     assert [each for each, _ in found.sets[0].names] == [
         candidate.name for candidate in table.best.fitted.candidates]
-    for one in found.sets:
-        assert sum(one.terms.to_dict().values()) == pytest.approx(one.cost, abs=1e-6)
+    for fitted in found.sets:
+        assert sum(fitted.terms.to_dict().values()) == pytest.approx(fitted.cost, abs=1e-6)
     for effect in found.effects:
         without = min(row.cost for row in table.rows
                       if effect.name not in {candidate.name for candidate in row.effects})
@@ -170,7 +170,7 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     planar_arm(tmp_path, 2)
     path = tmp_path / 'arm.yaml'
     model = DriveModel.load(path)
-    hidden = with_effects(model, {name: {f'j2.{key}': one for key, one in size.items()}})
+    hidden = with_effects(model, {name: {f'j2.{key}': value for key, value in size.items()}})
     size, omega = np.array([0.6, 0.8]), 2 * np.pi * np.array([0.5, 0.75])
     phase = TIME[:, None] * omega + [0.3, 1.1]
     moved = JointMotion(size * np.sin(phase), size * omega * np.cos(phase),
@@ -185,16 +185,16 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
             'run', TIME, moved.position[:, order], None, effort[:, order], drives)]))
     assert answer(found[0]) == answer(found[1])
     assert (name, ('j2',)) in answer(found[0])[1]
-    for one, other in zip(found[0].effects, found[1].effects, strict=True):
-        assert one.evidence == pytest.approx(other.evidence, rel=1e-3, abs=0.1)
+    for effect, other in zip(found[0].effects, found[1].effects, strict=True):
+        assert effect.evidence == pytest.approx(other.evidence, rel=1e-3, abs=0.1)
 
 
 @pytest.mark.parametrize('name', SOMETHING)
 def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: str) -> None:
     once, twice = diagnosed(name, 1), diagnosed(name, 1, 2)
     assert possible(twice) >= set(HIDDEN[name])
-    before, after = ({f'{one.name}.{key}': each.std for one in found.effects
-                      for key, each in one.parameters.items()} for found in (once, twice))
+    before, after = ({f'{effect.name}.{key}': each.std for effect in found.effects
+                      for key, each in effect.parameters.items()} for found in (once, twice))
     for key in before.keys() & after.keys():
         assert after[key] < before[key], key
 
@@ -202,8 +202,8 @@ def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: s
 def test_the_order_of_recordings_does_not_matter() -> None:
     forth, back = diagnosed('two', 1, 2), diagnosed('two', 2, 1)
     assert answer(forth) == answer(back)
-    assert [one.evidence for one in forth.effects] == pytest.approx(
-        [one.evidence for one in back.effects], abs=0.01)
+    assert [effect.evidence for effect in forth.effects] == pytest.approx(
+        [effect.evidence for effect in back.effects], abs=0.01)
 
 
 @pytest.mark.parametrize('name', ['viscous', 'spring', 'delay'])
@@ -236,14 +236,14 @@ def test_rivals_have_the_values_that_explain_the_same() -> None:
     best, rivals = found.effects[0], rival_effects(found)
     assert {name for _, *names in found.indistinguishable for name in names} == {
         rival.found.name for rival in rivals}
-    values = {one.name: one.parameters for one in (best, *(rival.found for rival in rivals))}
+    values = {found.name: found.parameters for found in (best, *(rival.found for rival in rivals))}
     for name, key, value in (('drive_spring', 'stiffness', spring),
                              ('drive_inertia', 'mass', -spring / omega ** 2)):
         estimate = values[name][f'{AXIS}.{key}']
         assert estimate.value == pytest.approx(value, abs=4 * estimate.std)
     for rival in rivals:
         assert 0 <= rival.cost <= DECISIONS.rival_margin
-        assert rival.found.name not in {one.name for one in found.effects}
+        assert rival.found.name not in {effect.name for effect in found.effects}
         if rival.found.name in ('drive_spring', 'drive_inertia'):
             left = rival.found.force - best.force
             assert np.sqrt(np.mean(left ** 2)) < 0.1 * np.sqrt(np.mean(best.force ** 2))
@@ -292,7 +292,7 @@ def test_no_sentence_asks_for_the_cause_of_an_effect_that_held_out_data_refute(
 ) -> None:
     words = word_diagnosis(diagnosed_half_way(is_there))
     asks = [words.headline, words.following, words.command,
-            *(f'{one.title} {one.what} {one.cause}' for one in words.effects)]
+            *(f'{effect.title} {effect.what} {effect.cause}' for effect in words.effects)]
     assert any('coulomb_friction' in each for each in asks) is is_there
     assert ('what happened to the machine' in words.following) is is_there
 
@@ -307,10 +307,10 @@ def of_force(hidden: Effects) -> float:
 def test_an_effect_is_credited_with_what_its_force_removes_the_largest_first() -> None:
     found = diagnosed('two', 1)
     sizes = {name: of_force({name: values}) for name, values in HIDDEN['two'].items()}
-    assert [one.name for one in found.effects] == sorted(sizes, key=lambda name: -sizes[name])
-    for one in found.effects:
-        removed = np.sqrt(one.error_before ** 2 - one.error_after ** 2)
-        assert removed == pytest.approx(sizes[one.name], rel=0.05)
+    assert [effect.name for effect in found.effects] == sorted(sizes, key=lambda name: -sizes[name])
+    for effect in found.effects:
+        removed = np.sqrt(effect.error_before ** 2 - effect.error_after ** 2)
+        assert removed == pytest.approx(sizes[effect.name], rel=0.05)
 
 
 def test_what_another_number_of_the_model_removes_is_credited_to_no_effect() -> None:

@@ -183,8 +183,8 @@ def dense(y: Array, covariance: Array) -> tuple[Array, Array]:
     """Return mean and standard deviations of the posterior by the textbook."""
     X = np.stack(list(COLUMNS.values()), axis=1)
     inverse = np.linalg.inv(covariance)
-    precision = np.diag([one.std ** -2 for one in PRIOR.values()])
-    mean = np.array([one.mean for one in PRIOR.values()])
+    precision = np.diag([prior.std ** -2 for prior in PRIOR.values()])
+    mean = np.array([prior.mean for prior in PRIOR.values()])
     posterior = np.linalg.inv(X.T @ inverse @ X + precision)
     return (posterior @ (X.T @ inverse @ y + precision @ mean), np.sqrt(np.diag(posterior)))
 
@@ -199,8 +199,8 @@ def test_with_white_noise_that_is_known_it_is_the_textbook() -> None:
     # And its cost is the marginal likelihood.
     X = np.stack(list(COLUMNS.values()), axis=1)
     marginal = multivariate_normal(
-        X @ [one.mean for one in PRIOR.values()],
-        0.16 * np.eye(LONG) + X @ np.diag([one.std ** 2 for one in PRIOR.values()]) @ X.T)
+        X @ [prior.mean for prior in PRIOR.values()],
+        0.16 * np.eye(LONG) + X @ np.diag([prior.std ** 2 for prior in PRIOR.values()]) @ X.T)
     assert found.cost == pytest.approx(
         -2 * marginal.logpdf(y) - LONG * np.log(2 * np.pi), abs=1e-4)
     np.testing.assert_allclose(found.residual[:, 0], y - X @ list(found.values.values()))

@@ -77,7 +77,7 @@ def test_a_wave_is_read_too_much_and_no_force(arm):
 @pytest.mark.parametrize(('turns', 'beside'), [(1.0, 0.02), (GEAR, 0.06)])
 def test_a_disc_beside_its_axis_is_found(arm, turns, beside):
     found = diagnose(arm, [recorded(arm, lambda q: disc(q, beside, turns, 0.5))])
-    assert [(one.name, one.drives) for one in found.effects] == [('eccentric_encoder', ('swing',))]
+    assert [(e.name, e.drives) for e in found.effects] == [('eccentric_encoder', ('swing',))]
     told = found.effects[0].parameters
     assert told['swing.pitch'].value == pytest.approx(2 * np.pi / turns, rel=0.1)
     assert told['swing.amplitude'].value == pytest.approx(beside / turns, rel=0.15)
@@ -90,7 +90,7 @@ def test_a_disc_beside_its_axis_is_found(arm, turns, beside):
 def test_what_waves_and_clearances_are_taken_for_stays_what_it_is(arm, name, values):
     model = with_effect(arm, name, **values)
     found = diagnose(arm, [recorded(arm, model=model)])
-    assert [one.name for one in found.effects] == [name]
+    assert [effect.name for effect in found.effects] == [name]
 
 
 # Torque constants that go with temperature and position: what sensors show, and its columns.
@@ -173,7 +173,7 @@ def with_backlash(model: Any, backlash: float) -> Recording:
 
 def found_on(model: DriveModel, recording: Recording) -> tuple[Diagnosis, list[object]]:
     found = diagnose(model, [recording])
-    return found, [(one.name, one.drives) for one in found.effects]
+    return found, [(effect.name, effect.drives) for effect in found.effects]
 
 
 @pytest.mark.parametrize('play', [0.02])
@@ -185,7 +185,7 @@ def test_behind_a_play_is_the_link(play: float) -> None:
     assert np.abs(encoder - link).max() == pytest.approx(play / 2, rel=1e-3)
     inside = slice(100, -100)
     assert np.abs(found - link)[inside].max() < 0.2 * play
-    before, after = (np.gradient(one - link, TIME)[inside] for one in (encoder, found))
+    before, after = (np.gradient(angle - link, TIME)[inside] for angle in (encoder, found))
     assert np.abs(after).max() < 0.25 * np.abs(before).max()
 
 
@@ -255,7 +255,7 @@ def wound_up(model: DriveModel, compliance: float, loss: float = 0.0, second: bo
 def test_an_elastic_joint_is_found_with_its_compliance(tmp_path: Path) -> None:
     model = real_arm(tmp_path)
     found = diagnose(model, [wound_up(model, COMPLIANCE, LOSS)])
-    assert [(one.name, one.drives) for one in found.effects] == [('elastic_joint', ('swing',))]
+    assert [(e.name, e.drives) for e in found.effects] == [('elastic_joint', ('swing',))]
     told = found.effects[0].parameters
     assert told['swing.compliance'].value == pytest.approx(COMPLIANCE, rel=0.1)
     assert told['swing.loss'].value == pytest.approx(LOSS, abs=0.01)
@@ -265,8 +265,8 @@ def test_what_efforts_do_not_show_the_second_encoder_tells(tmp_path: Path) -> No
     model = real_arm(tmp_path)
     found = diagnose(model, [wound_up(model, 2e-5, LOSS)])
     assert found.verdict != 'effect'
-    assert 'elastic_joint' not in [one.name for one in found.effects]
-    said, = (one for one in found.warnings if 'second encoder' in one)
+    assert 'elastic_joint' not in [effect.name for effect in found.effects]
+    said, = (warning for warning in found.warnings if 'second encoder' in warning)
     assert 'encoder of swing' in said
     number = re.search(r'wind-up of (\S+) rad/\(N m\), (\S+) ms', said)
     assert number is not None
@@ -284,8 +284,8 @@ def test_a_clearance_that_the_second_encoder_tells_is_lost_motion(
             else model.drive_forces(moved).mechanism.transmitted)[:, drive]
     link = plain.channels['link_position'].copy()
     link[:, drive] -= 1e-4 * np.sign(side)
-    said, = (one for one in diagnose(model, [replace(plain, channels={
-        'link_position': link})]).warnings if 'second encoder' in one)
+    said, = (warning for warning in diagnose(model, [replace(plain, channels={
+        'link_position': link})]).warnings if 'second encoder' in warning)
     number = re.search(r'clearance of (\S+) rad .*whose side the (\S+) chooses', said)
     assert number is not None
     assert float(number[1]) == pytest.approx(2e-4, rel=0.15)

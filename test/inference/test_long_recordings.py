@@ -74,7 +74,7 @@ def test_an_hour_is_diagnosed_from_excerpts_and_compared_as_a_whole() -> None:
     shares: list[float] = []
     answer = diagnose(given, whole, progress=lambda what, share: shares.append(share))
     assert answer.verdict == 'effect'
-    assert [one.name for one in answer.effects] == ['viscous_friction']
+    assert [effect.name for effect in answer.effects] == ['viscous_friction']
     found = answer.effects[0].parameters['axis.coefficient']
     assert abs(found.value - 20.0) < 3 * found.std
     assert len(answer.diagnosis.residuals) < 1.1 * MOST_BLOCKS

@@ -71,7 +71,7 @@ class Run:
 def run_of(model: DriveModel, motion: Any, still: Any) -> Run:
     forces, rest = model.drive_forces(motion), model.drive_forces(still)
     position, velocity, _ = forces.drive_motion
-    rigid, gravity = (one.parts['rigid_body'] for one in (forces, rest))
+    rigid, gravity = (f.parts['rigid_body'] for f in (forces, rest))
     return Run(model, motion.time, position, velocity, rigid - gravity, gravity,
                forces.total - rigid)
 
@@ -230,4 +230,4 @@ def test_other_peoples_recordings(case: str) -> None:
     for recording, model, kinds in CASES_OF[case]:
         read = shared_case(case, model, recording)
         found = find_no_measurements(read[0], effort_contents(*read))
-        assert {one.kind for one in found} == kinds, recording
+        assert {finding.kind for finding in found} == kinds, recording

@@ -136,7 +136,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
-    assert {type(one) for one in information.base} == {
+    assert {type(effect) for effect in information.base} == {
         ModelNumber, ReversalShape, PresentCoefficient, PresentShape}
 
 
@@ -283,5 +283,5 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
     write_recording(second, arm.record(real, moved, NOISE, seed=1))
     found = diagnose(arm_model, [read_recording(one_speed, arm_model.drives),
                                  read_recording(second, arm_model.drives)])
-    assert [one.name for one in found.effects] == ['viscous_friction']
+    assert [effect.name for effect in found.effects] == ['viscous_friction']
     assert found.indistinguishable == ()

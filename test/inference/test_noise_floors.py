@@ -65,5 +65,5 @@ def test_a_noise_that_cannot_be_told_is_not_printed(tmp_path: Path) -> None:
     model = real_arm(tmp_path)
     found = compare(model, record(model, motion(0.9), NOISE)).comparison
     assert found.drives
-    assert all(one.noise_floor is None for one in found.drives.values())
+    assert all(drive.noise_floor is None for drive in found.drives.values())
     assert 'the noise is not known' in found.verdict

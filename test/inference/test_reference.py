@@ -86,14 +86,14 @@ def test_another_speed_than_the_references_is_told(
     design = Design.of(model, [clean])
     since = SinceReference.of(reference, design.beside(reference.carried_over(design)))
     assert since.pace == pytest.approx(pace, rel=0.05)
-    told = [one for one in word_reference(since) if 'times the speed of the reference' in one]
+    told = [line for line in word_reference(since) if 'times the speed of the reference' in line]
     assert bool(told) == is_told
 
 
 def test_a_change_of_friction_is_told_alone(machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, 0, 3, change=0.4), reference=run(model, 0, 1))
-    assert [one.name for one in found.effects] == ['coulomb_friction']
+    assert [effect.name for effect in found.effects] == ['coulomb_friction']
     assert found.effects[0].drives == ('swing',)
     value = found.effects[0].parameters['swing.force']
     assert abs(value.value - 0.4) < 2 * value.std < 0.2
@@ -125,7 +125,7 @@ def test_ripple_and_reversals_of_the_reference_are_no_change(
                                      plain.effort + finer(moved), plain.drives)
 
     found = pprs.diagnose(model, worn(6, change), reference=worn(7))
-    assert [one.name for one in found.effects] == (['coulomb_friction'] if change else [])
+    assert [effect.name for effect in found.effects] == (['coulomb_friction'] if change else [])
 
 
 def test_wrong_numbers_of_the_base_are_carried_over_to_another_path(
@@ -156,8 +156,8 @@ def test_what_a_reference_leaves_open_is_no_change(
 
 def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None:
     model = arm.real_arm(tmp_path)
-    for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6))):
-        write_recording(tmp_path / f'{name}.csv', one)
+    for name, recording in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6))):
+        write_recording(tmp_path / f'{name}.csv', recording)
     (tmp_path / 'models').mkdir()
     base = tmp_path / 'models' / 'base.yaml'
     free, later = (str(tmp_path / f'{name}.csv') for name in ('free', 'later'))

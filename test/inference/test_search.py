@@ -94,7 +94,7 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     elsewhere = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
     there = elsewhere.evaluate((TILTED,))
     assert abs(there.total - tilted.total) > 3
-    costs = [Row.exact(*one).cost for one in ((fits, tilted), (elsewhere, there))]
+    costs = [Row.exact(*pair).cost for pair in ((fits, tilted), (elsewhere, there))]
     assert costs[0] == pytest.approx(costs[1], abs=1)
     # That of the true set is below its linear cost, of which tilts by 6 degrees are no small part.
     assert costs[0] < tilted.total

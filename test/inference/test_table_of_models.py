@@ -107,7 +107,7 @@ def test_what_no_form_explains_is_above_the_noise(
     fits = table.best.fits
     fitted = fits.evaluate(tuple(c for c in table.best.fitted.candidates if c.name in present))
     found = Answer(table, Row(fits, fitted, 0.0), ()).diagnosis()
-    assert {one.name for one in found.effects} == set(present)
+    assert {e.name for e in found.effects} == set(present)
     assert low < found.above_noise[AXIS] < high
     assert found.verdict == 'unknown'
 
@@ -116,9 +116,9 @@ def test_an_effect_within_the_form_error_of_the_models_friction_is_not_reported(
     """Of 40 N s/m, 1.5 % is the form error beside another effect."""
     small: Effects = {'viscous_friction': {'coefficient': 0.3}}
     found = diagnose(axis(), [axis_recording(axis({'drive_inertia': {'mass': 3.0}, **small}))])
-    assert 'viscous_friction' not in {one.name for one in found.effects}
+    assert 'viscous_friction' not in {e.name for e in found.effects}
     alone = diagnose(axis(), [axis_recording(axis(small), noise=0.05)])
-    assert [one.name for one in alone.effects] == ['viscous_friction']
+    assert [e.name for e in alone.effects] == ['viscous_friction']
 
 
 def test_an_uncertainty_is_that_of_all_near_sets_with_the_effect() -> None:
@@ -127,14 +127,14 @@ def test_an_uncertainty_is_that_of_all_near_sets_with_the_effect() -> None:
         {'viscous_friction': {'coefficient': 12.0}, 'drive_inertia': {'mass': 0.03}}))]).selection
     assert table is not None
     key, answer = f'{AXIS}.coefficient', Answer(table, table.best, ())
-    found = next(one for one in answer.effects if one.name == 'viscous_friction').parameters[key]
+    found = next(e for e in answer.effects if e.name == 'viscous_friction').parameters[key]
     values, weights = [], []
     for cost, fitted in [(0.0, table.reported), *table.near(MARGIN)]:
         friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
         values.append(estimate(table.last, fitted, friction).parameters[key])
         weights.append(np.exp(-cost / 2))
     assert len(values) > 2
-    squares = [one.std ** 2 + (one.value - found.value) ** 2 for one in values]
+    squares = [v.std ** 2 + (v.value - found.value) ** 2 for v in values]
     assert found.std ** 2 == pytest.approx(np.average(squares, weights=weights), rel=1e-3)
     assert found.std > 1.01 * values[0].std
 
@@ -189,23 +189,23 @@ def adequate() -> Diagnosis:
         'viscous_friction', 'effort_offset'))])
 def test_an_effect_of_twice_the_size_is_seen_and_one_of_a_quarter_is_not(
         name: str, adequate: Diagnosis) -> None:
-    size = next(one.size for one in adequate.detectable if one.effect.name == name)
+    size = next(limit.size for limit in adequate.detectable if limit.effect.name == name)
     for seed in (2, 3):
         assert told(seed, name, 2 * size).verdict != 'adequate'
         assert told(seed, name, size / 4).verdict == 'adequate'
 
 
 def test_more_noise_hides_more(adequate: Diagnosis) -> None:
-    loud = {one.effect.name: one.size for one in told(5, noise=0.7).detectable}
-    quiet = {one.effect.name: one.size for one in adequate.detectable}
+    loud = {limit.effect.name: limit.size for limit in told(5, noise=0.7).detectable}
+    quiet = {limit.effect.name: limit.size for limit in adequate.detectable}
     for name in ('drive_inertia', 'coulomb_friction'):
         assert loud[name] > 1.5 * quiet[name]
 
 
 def test_what_was_found_or_is_in_the_model_is_not_listed(adequate: Diagnosis) -> None:
-    size = next(one.size for one in adequate.detectable if one.effect.name == 'viscous_friction')
+    size = next(d.size for d in adequate.detectable if d.effect.name == 'viscous_friction')
     found = told(2, 'viscous_friction', 20 * size)
-    assert [one.name for one in found.effects] == ['viscous_friction']
-    names = {one.effect.name for one in found.detectable}
+    assert [e.name for e in found.effects] == ['viscous_friction']
+    names = {limit.effect.name for limit in found.detectable}
     assert 'viscous_friction' not in names
     assert 'drive_inertia' in names

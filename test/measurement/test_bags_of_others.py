@@ -84,7 +84,7 @@ def ros2(path: Path, messages: Callable[[int], dict[str, Any]],
          pack: Callable[[Writer], None] = lambda writer: None) -> Path:
     """Write a bag of what a function returns for each sample, by topic."""
     every = [messages(k) for k in range(N)]
-    return write_plain_bag(path, {topic: [one[topic] for one in every] for topic in every[0]},
+    return write_plain_bag(path, {topic: [s[topic] for s in every] for topic in every[0]},
                            received=stamp, pack=pack)
 
 

@@ -162,7 +162,7 @@ def test_a_column_of_a_drive_is_its_channel_and_gaps_stay_gaps(tmp_path):
     assert describe(recording).drives['j2'].channels == {
         'temperature': (WARM[0], pytest.approx(WARM[190]))}
     assert describe(recording).drives['j1'].channels == {}
-    assert not [one for one in recording.findings if one.kind == 'ignored_columns']
+    assert not [finding for finding in recording.findings if finding.kind == 'ignored_columns']
 
 
 def test_columns_of_a_model_file_and_of_the_whole_machine(tmp_path):

@@ -199,7 +199,7 @@ def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
     assert len(recording.time) == count
     assert recording.time[-1] - recording.time[0] == pytest.approx(
         scale * arrays['time'][-1], rel=1e-6)
-    slow, = (one for one in recording.findings if one.kind == 'slow_rate')
+    slow, = (finding for finding in recording.findings if finding.kind == 'slow_rate')
     assert unit in slow.text
 
 
@@ -210,7 +210,7 @@ def test_what_pandas_has_for_missing_values_counts_as_missing() -> None:
     frames['effort'].iloc[10, 2] = frames['velocity'].iloc[20, 3] = pd.NA
     frames['position'].iloc[30, 1] = pd.NA
     given = frames | {'effort': frames['effort'].astype(object), 'velocity': [
-        [None if pd.isna(one) else one for one in row]
+        [None if pd.isna(cell) else cell for cell in row]
         for row in frames['velocity'].to_numpy(dtype=object)]}
     dates = pd.Series(pd.to_datetime(1.7e9 + arrays['time'], unit='s'))
     recording = Recording.from_arrays('frame', dates, **given)
@@ -391,6 +391,6 @@ def test_a_few_damaged_rows_are_discarded_and_counted(rows: Any, value: float) -
     kept[rows] = False
     np.testing.assert_array_equal(recording.position, position[kept])
     np.testing.assert_array_equal(recording.effort, effort[kept])
-    found = {one.kind: one for one in recording.findings}
+    found = {finding.kind: finding for finding in recording.findings}
     assert found['impossible_position'].count == (~kept).sum()
     assert f'{abs(value):.3g}' in found['impossible_position'].text

@@ -165,7 +165,7 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
     blocks.add(data[:70], list(range(70)))
     blocks.add(data[70:], list(range(70, 120)))
     assert blocks.names == set(joints)
-    states = [STORE.deserialize_cdr(one, STATE) for one in data]
+    states = [STORE.deserialize_cdr(raw, STATE) for raw in data]
     whole = [k for k, state in enumerate(states)
              if {*DRIVES} <= {*state.name} and len(state.position) == len(state.name)]
     stamps, received, *arrays = blocks.arrays()
@@ -175,8 +175,8 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
     for quantity, found in zip(QUANTITIES, arrays, strict=True):
         values = [getattr(states[k], quantity) for k in whole]
         np.testing.assert_array_equal(found, np.array([
-            [one[list(states[k].name).index(drive)] for drive in DRIVES] if len(one) else
-            [np.nan] * 6 for k, one in zip(whole, values, strict=True)]).reshape(-1, 6))
+            [numbers[list(states[k].name).index(drive)] for drive in DRIVES] if len(numbers) else
+            [np.nan] * 6 for k, numbers in zip(whole, values, strict=True)]).reshape(-1, 6))
 
 
 @pytest.mark.parametrize('absent', [(), ('velocity',), ('effort',), ('velocity', 'effort')])
@@ -544,9 +544,9 @@ def test_the_same_motion_with_other_noise_is_another_recording(folder: Path) -> 
 def test_recordings_of_a_robot_at_rest_are_alike_and_no_repeats() -> None:
     time = np.arange(500) * 0.002
     still = np.full((500, 6), 0.1)
-    one, other = (Recording.from_arrays(name, time, still, None, np.ones((500, 6)))
-                  for name in 'ab')
-    assert shared_samples(one, other) == 0
+    first, other = (Recording.from_arrays(name, time, still, None, np.ones((500, 6)))
+                    for name in 'ab')
+    assert shared_samples(first, other) == 0
 
 
 def test_info_says_what_repeats(folder: Path) -> None:

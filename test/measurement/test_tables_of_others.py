@@ -99,7 +99,7 @@ def test_stamps_since_1970_are_told_by_their_size(
     recording = read(tmp_path / 'run.csv', ALL)
     assert_read(recording, 1e-6)
     assert recording.epoch == EPOCH
-    kinds = {one.kind: one.text for one in recording.findings}
+    kinds = {finding.kind: finding.text for finding in recording.findings}
     assert 'epoch_unit' in kinds
     assert kinds['epoch_unit'] == f'the stamps count {word} since 1970; they are read so'
     pd.DataFrame(WHOLE[:, 1:]).rename(columns=str).assign(
@@ -117,7 +117,7 @@ def test_stamps_since_a_machine_started_are_no_dates(
     pd.DataFrame(WHOLE[:, 1:]).assign(
         stamp=np.rint((up + TIME) * per_second).astype(np.int64)).to_csv(
         tmp_path / 'run.csv', index=False, columns=['stamp', *range(6)])
-    kinds = {one.kind: one.text for one in read(tmp_path / 'run.csv', ALL).findings}
+    kinds = {finding.kind: finding.text for finding in read(tmp_path / 'run.csv', ALL).findings}
     assert 'epoch_unit' not in kinds
     assert f'must be divided by {per_second:.0e}' in kinds['slow_rate']
 
@@ -228,7 +228,7 @@ def test_files_with_times_of_their_own_are_held_at_those_of_the_positions(tmp_pa
     written_apart(tmp_path, shift=-STEP / 2, before='first_')
     recording = read(tmp_path / 'second_q.csv', keys)
     np.testing.assert_allclose(recording.effort[1:-1], (EFFORT[1:-1] + EFFORT[2:]) / 2, atol=1e-9)
-    assert 'merged' in {one.kind for one in recording.findings}
+    assert 'merged' in {finding.kind for finding in recording.findings}
     with pytest.raises(UnreadableFileError, match='2 files of the name'):
         read(tmp_path, keys)
 
@@ -290,7 +290,7 @@ def test_currents_without_a_gain_and_a_gain_without_currents_are_told(tmp_path: 
                            *(f'{joint}/{quantity}' for joint in JOINTS)])
         (tmp_path / 'run.csv').write_text(text(WHOLE, header=header + '\n'))
         recording = read_recording(tmp_path / 'run.csv', RecordedDrives(JOINTS, gain=(gain,) * 3))
-        kinds = {one.kind for one in recording.findings}
+        kinds = {finding.kind for finding in recording.findings}
         assert ('no_gain' in kinds) == (kind == 'no_gain')
         assert ('gain_unused' in kinds) == (kind == 'gain_unused')
         np.testing.assert_allclose(recording.effort, EFFORT * (

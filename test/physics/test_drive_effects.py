@@ -324,10 +324,10 @@ def test_a_warm_drive_does_not_get_cold_as_a_parameter_changes() -> None:
 
 def test_a_stressed_contact_does_not_relax_as_a_parameter_changes() -> None:
     """In the middle of a stroke, far from a reversal, presliding has long been overcome."""
-    one, other = (with_effect('hysteresis', force=force, distance=1e-3) for force in (2.0, 3.0))
-    state = one.initial_state()
-    moved(one, 0.0, state)
-    again = other.continued_state(one, state)
+    first, other = (with_effect('hysteresis', force=force, distance=1e-3) for force in (2.0, 3.0))
+    state = first.initial_state()
+    moved(first, 0.0, state)
+    again = other.continued_state(first, state)
     expected = with_effect('hysteresis', force=3.0, distance=1e-3)
     whole = expected.initial_state()
     moved(expected, 0.0, whole)

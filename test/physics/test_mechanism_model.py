@@ -217,7 +217,7 @@ def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder:
                 '--adopt-all', '--output', 'better.yaml', '--json', 'result.json', cwd=folder)
     assert done.returncode == 0, done.stderr
     found = json.loads((folder / 'result.json').read_text())
-    assert [one['name'] for one in found['effects']] == ['drive_spring']
+    assert [effect['name'] for effect in found['effects']] == ['drive_spring']
     assert found['effects'][0]['drives'] == [AXIS]
     values = found['effects'][0]['parameters']
     stiffness = values['axis.stiffness']

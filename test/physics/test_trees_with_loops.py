@@ -59,8 +59,8 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
 def test_python_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                                monkeypatch: pytest.MonkeyPatch) -> None:
     structure = DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure
-    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
-              for one in structure.friction_rows}
+    joints = {hinge: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
+              for hinge in structure.friction_rows}
     model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])[:8]
     compiled = model.drive_forces(motion).parts
@@ -152,13 +152,13 @@ OF_BOTH = {
     'joint_friction': (
         {'revolute.viscous': 0.03, 'revolute.torque': 0.02, 'revolute.coulomb': 0.3,
          'spherical.viscous': 0.01, 'spherical.torque': 0.04, 'spherical.coulomb': 0.2},
-        {**{f'{one}.{key}': value for one in HINGES for key, value in (
+        {**{f'{hinge}.{key}': value for hinge in HINGES for key, value in (
             ('viscous', 0.03), ('torque', 0.02), ('coulomb', 0.3))},
-         **{f'{one}.{key}': value for one in BALLS for key, value in (
+         **{f'{ball}.{key}': value for ball in BALLS for key, value in (
              ('viscous', 0.01), ('torque', 0.04), ('coulomb', 0.2))}}),
     'joint_spring': (
         {'revolute.stiffness': 0.8, 'revolute.position': 1.3},
-        {f'{one}.{key}': value for one in HINGES for key, value in (
+        {f'{hinge}.{key}': value for hinge in HINGES for key, value in (
             ('stiffness', 0.8), ('position', 1.3 - np.pi / 2))}),
     'payload_mass': ({'mass': 0.4},) * 2,
     'external_wrench': ({'force_x': 15.0, 'force_y': -25.0, 'force_z': 50.0, 'moment_x': 0.4,
@@ -172,10 +172,10 @@ def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> Non
     paper, model = three_pprs(tmp_path, drives=True)
     motion = random_motion(np.random.default_rng(4), 100)
     parts = []
-    for one, values in zip((paper, model), OF_BOTH[name], strict=True):
-        changed = with_effects(one, {name: values})
+    for robot, values in zip((paper, model), OF_BOTH[name], strict=True):
+        changed = with_effects(robot, {name: values})
         s = paper.drive_forces(motion).mechanism
-        parts.append(changed.drive_forces(motion if one is paper else JointMotion(
+        parts.append(changed.drive_forces(motion if robot is paper else JointMotion(
             s.position, s.velocity, s.acceleration)).parts)
     closed, tree = parts
     assert np.abs(closed[name]).max() > 0.05

@@ -153,7 +153,7 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
         assert running.spin_until(lambda: len(commands) == len(moved)), running.status[-1]
         process.send_signal(signal.SIGTERM)
         assert process.wait(10) == 0
-    np.testing.assert_allclose([one.data for one in commands], model.drive_forces(moved).total,
+    np.testing.assert_allclose([sent.data for sent in commands], model.drive_forces(moved).total,
                                rtol=0, atol=EQUAL)
 
 

@@ -58,7 +58,7 @@ def forwarded(
 
 @pytest.mark.parametrize('rate', [50.0, 1000.0])
 def test_a_stream_is_taken_with_reserve_by_the_defaults(rate: float) -> None:
-    given = {one.name: one.default for one in play_trajectory.PARAMETERS}
+    given = {parameter.name: parameter.default for parameter in play_trajectory.PARAMETERS}
     for allows, stop_time in ((False, STOP), (True, 0.0)):
         message = forwarded(given['points'], given['ahead'], rate=rate, stop_time=stop_time)
         controller = replace(settings(), allow_nonzero_velocity_at_trajectory_end=allows)

@@ -35,21 +35,21 @@ def pushed(windows: StreamWindows, seconds: float, rate: float, start: int) -> l
 def test_windows_do_not_overlap_and_are_no_longer_than_the_span() -> None:
     found = pushed(StreamWindows(10.0, 10.0), 35.0, 20.0, EPOCH)
     assert len(found) == 3
-    for one, following in pairwise(found):
-        assert one.stamp[-1] < following.stamp[0]
-    assert all(one.stamp[-1] - one.stamp[0] <= 10 * SECOND for one in found)
+    for window, following in pairwise(found):
+        assert window.stamp[-1] < following.stamp[0]
+    assert all(window.stamp[-1] - window.stamp[0] <= 10 * SECOND for window in found)
 
 
 def test_a_short_period_waits_until_half_a_span_is_there() -> None:
     found = pushed(StreamWindows(2.0, 10.0), 30.0, 20.0, EPOCH)
-    assert all(one.stamp[-1] - one.stamp[0] >= 5 * SECOND for one in found)
+    assert all(window.stamp[-1] - window.stamp[0] >= 5 * SECOND for window in found)
 
 
 def test_a_clock_that_is_set_back_begins_a_new_stream() -> None:
     windows = StreamWindows(10.0, 10.0)
     pushed(windows, 8.0, 20.0, EPOCH)
     found = pushed(windows, 12.0, 20.0, EPOCH - 3600 * SECOND)
-    assert [one.stamp[0] for one in found] == [EPOCH - 3600 * SECOND]
+    assert [window.stamp[0] for window in found] == [EPOCH - 3600 * SECOND]
 
 
 def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:

@@ -55,7 +55,7 @@ def test_what_is_no_message_of_the_monitor_is_passed_over(running: tuple[Bench, 
 
 
 @pytest.mark.parametrize('reliability', [ReliabilityPolicy.BEST_EFFORT],
-                         ids=lambda one: one.name)
+                         ids=lambda case: case.name)
 @pytest.mark.parametrize('comes', ['before', 'after'])
 def test_joint_states_are_heard_whatever_their_publisher_offers(
     reliability: ReliabilityPolicy, comes: str,

@@ -51,9 +51,9 @@ def test_no_attribute_of_a_node_takes_the_place_of_rclpys() -> None:
             if isinstance(each, ast.ClassDef) and (each.name == 'Node' or any(
                     'Node' in ast.unparse(base) for base in each.bases)):
                 found[each.name] = {
-                    one.attr for one in ast.walk(each)
-                    if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store)
-                    and ast.unparse(one.value) == 'self' and one.attr.startswith('_')}
+                    node.attr for node in ast.walk(each)
+                    if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+                    and ast.unparse(node.value) == 'self' and node.attr.startswith('_')}
         return found
     taken = nodes(Path(rclpy_node.__file__))['Node']
     assert {'_subscriptions', '_publishers', '_timers'} <= taken

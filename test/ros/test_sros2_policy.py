@@ -40,8 +40,8 @@ def allowed(node: str) -> Names:
     for group in profile:
         for right in group.attrib:
             kind = KINDS.get((group.tag, right), right)
-            for one in group:
-                name = one.text or ''
+            for entry in group:
+                name = entry.text or ''
                 found[kind].add(name if name.startswith('/') else f'/{node}{name[1:]}'
                                 if name.startswith('~') else f'/{name}')
     return found

@@ -353,9 +353,9 @@ def test_stops_end_the_strokes() -> None:
 # Sensors.
 
 def test_a_seed_repeats_a_recording_bit_for_bit() -> None:
-    one, same, other = (wave(axis(SensorSettings(), seed), 0.1)[0][-1] for seed in (1, 1, 2))
-    assert np.array_equal(one.effort, same.effort)
-    assert not np.array_equal(one.effort, other.effort)
+    first, same, other = (wave(axis(SensorSettings(), seed), 0.1)[0][-1] for seed in (1, 1, 2))
+    assert np.array_equal(first.effort, same.effort)
+    assert not np.array_equal(first.effort, other.effort)
 
 
 def test_encoders_count_in_whole_steps() -> None:

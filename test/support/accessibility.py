@@ -15,5 +15,5 @@ def broken_rules(tab: Any) -> list[str]:
     from axe_playwright_python.sync_playwright import Axe
 
     found = Axe().run(tab).response['violations']
-    return [f'{one["id"]}: {one["nodes"][0]["target"]} {one["nodes"][0]["failureSummary"]}'
-            for one in found if one['impact'] in GRAVE]
+    return [f'{v["id"]}: {v["nodes"][0]["target"]} {v["nodes"][0]["failureSummary"]}'
+            for v in found if v['impact'] in GRAVE]

@@ -72,13 +72,13 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
     """Return a diagnosis; `changes` are its fields."""
     residuals, model = made_up_residuals(), DriveModel.load()
     effects = changes.get('effects', ())
-    missing = sum((one.force for one in effects), np.zeros((SAMPLES, 6)))
+    missing = sum((effect.force for effect in effects), np.zeros((SAMPLES, 6)))
     given = Residuals(DRIVES, residuals.time, residuals.segment, residuals.measured + missing,
                       residuals.model, {}, residuals.variables, PERIOD)
     fields: dict[str, Any] = {
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
-            ranked_effect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
+            ranked_effect(e.name, e.drives, e.evidence, e.error_after) for e in effects),
         'suspects': (), 'depends_on': (), 'sets': (), 'barred': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),

@@ -50,7 +50,7 @@ def with_definitions(store: Any) -> Any:
     """Return a store of types that has those of `DEFINITIONS` as well."""
     for name, text in DEFINITIONS.items():
         found = get_types_from_msg(text, name)
-        store.register({key: one for key, one in found.items() if key not in store.types})
+        store.register({key: t for key, t in found.items() if key not in store.types})
     return store
 
 

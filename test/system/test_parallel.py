@@ -29,9 +29,9 @@ def test_lazy_properties_of_two_objects_are_made_side_by_side_and_once(monkeypat
     monkeypatch.setattr(parallel, 'WORKERS', 2)
     beside = Barrier(2, timeout=5)
     squares = [Square(number, beside) for number in (3, 4)]
-    assert each(lambda one: one.value, squares) == [9, 16]
-    assert [one.value for one in squares] == [9, 16]
-    assert [one.made for one in squares] == [1, 1]
+    assert each(lambda square: square.value, squares) == [9, 16]
+    assert [square.value for square in squares] == [9, 16]
+    assert [square.made for square in squares] == [1, 1]
     vars(squares[0]).pop('value')
-    assert each(lambda one: one.value if one is squares[0] else beside.wait(), squares)[0] == 9
+    assert each(lambda s: s.value if s is squares[0] else beside.wait(), squares)[0] == 9
     assert squares[0].made == 2
