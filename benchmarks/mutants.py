@@ -118,14 +118,14 @@ def noticed_by(copy: Path, tests: Sequence[str]) -> str:
 def report(outcomes: Sequence[Outcome]) -> str:
     """Return tables of the modules, and of the mistakes."""
     rows = ['| module | noticed | of |', '|---|---|---|']
-    for module in dict.fromkeys(one.module for one in outcomes):
-        of = [bool(one.noticed_by) for one in outcomes if one.module == module]
+    for module in dict.fromkeys(outcome.module for outcome in outcomes):
+        of = [bool(outcome.noticed_by) for outcome in outcomes if outcome.module == module]
         rows.append(f'| `{module}` | {sum(of)} | {len(of)} |')
-    rows.append(f'| all | {sum(bool(one.noticed_by) for one in outcomes)} | {len(outcomes)} |')
+    rows.append(f'| all | {sum(bool(o.noticed_by) for o in outcomes)} | {len(outcomes)} |')
     rows += ['', '| module | mistake | noticed by |', '|---|---|---|']
-    rows += [f'| `{Path(one.module).stem}` | {one.mistake} | '
-             + (f'`{one.noticed_by}` |' if one.noticed_by else '**no test** |')
-             for one in outcomes]
+    rows += [f'| `{Path(outcome.module).stem}` | {outcome.mistake} | '
+             + (f'`{outcome.noticed_by}` |' if outcome.noticed_by else '**no test** |')
+             for outcome in outcomes]
     return '\n'.join(rows)
 
 

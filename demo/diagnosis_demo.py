@@ -216,12 +216,12 @@ def reveal(story: Story, diagnosis: dict[str, Any], added: bool) -> str:
     table.add_column('hidden in the robot', style='green')
     table.add_column('found from the recording', style='cyan')
     found = diagnosis['effects']
-    table.add_row('effect', hidden['name'], ', '.join(one['name'] for one in found) or 'nothing')
-    table.add_row('on', _drives(hidden), '; '.join(_drives(one) for one in found) or '-')
+    table.add_row('effect', hidden['name'], ', '.join(e['name'] for e in found) or 'nothing')
+    table.add_row('on', _drives(hidden), '; '.join(_drives(effect) for effect in found) or '-')
     table.add_row('parameters', _hidden_parameters(hidden['parameters']),
-                  '\n'.join(f'{key} = {one["value"]:.4g} ± {2 * (one["std"] or 0):.2g} '
-                            f'{one["unit"]}' for effect in found
-                            for key, one in effect['parameters'].items() if one['value']) or '-')
+                  '\n'.join(f'{key} = {p["value"]:.4g} ± {2 * (p["std"] or 0):.2g} '
+                            f'{p["unit"]}' for effect in found
+                            for key, p in effect['parameters'].items() if p['value']) or '-')
     story.console.print(table)
     sentence = _judged(hidden, diagnosis)
     if not added:
@@ -238,7 +238,7 @@ def draw(story: Story, added: bool, sentence: str) -> Path:
     noise = float(story.read('why.json')['noise_floor'])
     if added:
         after, _ = measure_residuals(DriveModel.load(story.file('adopted.yaml')), [recording])
-        fall = [float((one.error ** 2).mean() ** 0.5) for one in (before, after)]
+        fall = [float((residuals.error ** 2).mean() ** 0.5) for residuals in (before, after)]
         sentence += (f'\nError on a motion that was not fitted: {fall[0]:.3f} N before, '
                      f'{fall[1]:.3f} N after.')
     return draw_before_after(story.folder / 'demo.png', before, after, noise, sentence)
@@ -246,9 +246,9 @@ def draw(story: Story, added: bool, sentence: str) -> Path:
 
 def _judged(hidden: dict[str, Any], diagnosis: dict[str, Any]) -> str:
     name, known = hidden['name'], hidden['name'] in CATALOGUE
-    found = [one['name'] for one in diagnosis['effects']]
+    found = [effect['name'] for effect in diagnosis['effects']]
     rivals = {rival for names in diagnosis['indistinguishable'] for rival in names}
-    others = [one for one in found if one != name]
+    others = [other for other in found if other != name]
     if name in found:
         mine = diagnosis['effects'][found.index(name)]
         return f'{name} was hidden, and {name} was found' + (
@@ -264,7 +264,7 @@ def _judged(hidden: dict[str, Any], diagnosis: dict[str, Any]) -> str:
                 + (f'; {", ".join(found)}, which was added, is not in the robot.' if found
                    else '.'))
     if not found:
-        suspected = name in [one['name'] for one in diagnosis['suspects']]
+        suspected = name in [effect['name'] for effect in diagnosis['suspects']]
         return (f'{name} was hidden, and ' + ('was suspected only: slow noise could be it.'
                 if suspected else 'was not found: too weak for this motion and noise.'
                 if diagnosis['verdict'] == 'adequate' else

@@ -76,8 +76,8 @@ def run_all(
         for path in PATHS:
             runs[case.name, path] = drive(case, path)
             print(f'{case.name}, {path}: ' + '; '.join(
-                f'{1e3 * one.position_rms:.4f} mm, {1e3 * one.angle_rms:.4f} mrad {kind}'
-                for kind, one in runs[case.name, path].items()), file=sys.stderr, flush=True)
+                f'{1e3 * run.position_rms:.4f} mm, {1e3 * run.angle_rms:.4f} mrad {kind}'
+                for kind, run in runs[case.name, path].items()), file=sys.stderr, flush=True)
 
     for case in cases:
         run(case)

@@ -79,7 +79,7 @@ def main() -> None:
     draw_where(measure_residuals(before, [run])[0])
     draw_candidates(answer)
     residuals = [measure_residuals(model, [other])[0] for model in (before, after)]
-    fall = [float(np.sqrt(np.nanmean(one.error ** 2))) for one in residuals]
+    fall = [float(np.sqrt(np.nanmean(residual.error ** 2))) for residual in residuals]
     draw_before_after(
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
@@ -150,9 +150,9 @@ def draw_candidates(answer: Mapping[str, Any]) -> None:
     figure = new_figure(8, 3.5)
     axis = figure.subplots()
     best = answer['candidates'][:MOST_CANDIDATES]
-    names = [one['name'] + (f' on {", ".join(one["drives"])}' if one['drives'] and len(
-        one['drives']) < 4 else '') for one in best]
-    axis.barh(names, [one['evidence'] for one in best],
+    names = [effect['name'] + (f' on {", ".join(effect["drives"])}' if effect['drives'] and len(
+        effect['drives']) < 4 else '') for effect in best]
+    axis.barh(names, [effect['evidence'] for effect in best],
               color=[BLUE, *[GREY] * (len(best) - 1)])
     axis.axvline(0, color='black', lw=0.8)
     axis.invert_yaxis()

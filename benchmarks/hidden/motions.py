@@ -58,9 +58,9 @@ class RandomMotion:
         """Return the motion at times [s]: exact velocities and accelerations."""
         value, rate, gain = self._coordinates(time)
         (psi, theta, phi), w, e = value[3:], rate[3:], gain[3:]
-        zero, one = np.zeros_like(psi), np.ones_like(psi)
+        zero, unit = np.zeros_like(psi), np.ones_like(psi)
         # Axes of the three turns in `base`, and how the earlier turns carry them along.
-        z = np.stack((zero, zero, one), axis=1)
+        z = np.stack((zero, zero, unit), axis=1)
         y = np.stack((-np.sin(psi), np.cos(psi), zero), axis=1)
         x = np.stack((np.cos(psi) * np.cos(theta), np.sin(psi) * np.cos(theta),
                       -np.sin(theta)), axis=1)

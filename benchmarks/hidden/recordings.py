@@ -272,18 +272,18 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
     """Return the model, a recording, and the truth about it as data for JSON."""
     place = scene(case.seed, case.width, case.duration)
     found = [_draw(case, place, name) for name in case.effects]
-    deviation = min([one.noise for one in found], default=NOISE)
-    effects = [one.effect for one in found]
+    deviation = min([drawn.noise for drawn in found], default=NOISE)
+    effects = [drawn.effect for drawn in found]
     settings = noise_settings(case.noise, deviation)
     noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(place.time))
     recording = place.recording(case.name, effects, noise, [
-        case.rng(f'form {one.what}') for one in found] if case.row == 'forms' else ())
+        case.rng(f'form {drawn.what}') for drawn in found] if case.row == 'forms' else ())
     truth = {
         'case': asdict(case), 'name': case.name,
-        'effects': [{**place.inject([one.effect]).truths[0], 'scale': one.scale,
-                     'snr': one.snr * NOISE / deviation,
-                     'snr_by_drive': (one.by_drive * NOISE / deviation).tolist()}
-                    for one in found],
+        'effects': [{**place.inject([drawn.effect]).truths[0], 'scale': drawn.scale,
+                     'snr': drawn.snr * NOISE / deviation,
+                     'snr_by_drive': (drawn.by_drive * NOISE / deviation).tolist()}
+                    for drawn in found],
         'noise': deviation, 'noise_floor': float(np.sqrt(np.mean(place.treat(noise) ** 2))),
         'noise_by_drive': np.sqrt(np.mean(place.treat(noise) ** 2, axis=0)).tolist(),
         'drive_width': list(place.drive_width), 'passive_width': place.passive_width,

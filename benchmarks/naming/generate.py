@@ -87,21 +87,21 @@ def draws(seed: int, count: int) -> Iterator[Draw]:
     rounds: dict[tuple[str, str], Iterator[str]] = {}
 
     def following(what: str, of: str, values: Sequence[object]) -> str:
-        return next(rounds.setdefault((what, of), _shuffled(rng, [str(one) for one in values])))
+        return next(rounds.setdefault((what, of), _shuffled(rng, [str(value) for value in values])))
 
     for k in range(count):
         kind = KINDS[k % len(KINDS)]
-        robots = [one for one in ROBOTS if kind not in ('two', 'three') or one != 'axis']
+        robots = [robot for robot in ROBOTS if kind not in ('two', 'three') or robot != 'axis']
         robot = following('robot', 'sets' if kind in ('two', 'three') else kind, robots)
         names = [name for name in hidden_names(robot) if kind != 'form' or name in CAN_BE_OFF]
         if kind in ('two', 'three'):
             size = ('two', 'three').index(kind) + 2
-            chosen = tuple(str(one) for one in rng.choice(sorted(names), size, replace=False))
+            chosen = tuple(str(name) for name in rng.choice(sorted(names), size, replace=False))
         else:
             chosen = () if kind in ('nothing', 'unknown') else (
                 following('names', f'{robot} {kind == "form"}', sorted(names)),)
         least = {'form': STRONG, 'unknown': STRONG, 'two': 1.0, 'three': 1.0}.get(kind, 0.0)
-        snr = float(following('snr', kind, [one for one in SNRS if one >= least]))
+        snr = float(following('snr', kind, [strength for strength in SNRS if strength >= least]))
         noise = following('noise', kind, NOISES)
         yield Draw(robot, kind, chosen, 0.0 if kind == 'nothing' else snr, noise,
                    int(rng.integers(2 ** 31)))
@@ -109,7 +109,7 @@ def draws(seed: int, count: int) -> Iterator[Draw]:
 
 def _shuffled(rng: np.random.Generator, values: Sequence[str]) -> Iterator[str]:
     while True:
-        yield from (str(one) for one in rng.permutation(values))
+        yield from (str(value) for value in rng.permutation(values))
 
 
 def make(draw: Draw, folder: Path) -> Truth:
@@ -150,7 +150,7 @@ def _write_model(robot: str, model: DriveModel, folder: Path) -> None:
 
 def _truth(draw: Draw, effects: Sequence[dict[str, object]]) -> Truth:
     return Truth(draw.name, draw.robot, draw.kind, draw.noise, draw.snr, tuple(
-        _named(one, draw.kind) for one in effects))
+        _named(effect, draw.kind) for effect in effects))
 
 
 def _named(effect: dict[str, object], kind: str) -> Named:
@@ -193,7 +193,7 @@ def _of_arm(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
         effects.append({'name': 'local_bump', 'drives': [drive], 'parameters': {}})
     sigma = LEVEL * largest
     if draw.snr:
-        signal = _added(*(_residuals(model, time, *one) for one in (
+        signal = _added(*(_residuals(model, time, *pair) for pair in (
             (run.position, effort), (plain.position, plain.effort)))) / sigma
         strength = np.sqrt(np.nanmean(np.square(signal), axis=0))
         feels = strength > FELT * strength.max()
@@ -214,7 +214,7 @@ def _residuals(model: DriveModel, time: Array, position: Array, effort: Array) -
 
 def _added(with_effects: Residuals, plain: Residuals) -> Array:
     """Return what effects add to the error, (M, D), where both are known: rests may differ."""
-    both = [np.isin(one.time, other.time) for one, other in (
+    both = [np.isin(run.time, other.time) for run, other in (
         (with_effects, plain), (plain, with_effects))]
     return np.asarray(with_effects.error[both[0]] - plain.error[both[1]])
 

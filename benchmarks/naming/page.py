@@ -77,7 +77,7 @@ def alike(scored: Mapping[str, Scored]) -> dict[str, Scored]:
     """Return the answers to the problems that all have answered."""
     count = Counter(problem for answers in scored.values()
                     for problem in {truth.problem for truth, *_ in answers})
-    return {name: [one for one in answers if count[one[0].problem] == len(scored)]
+    return {name: [answer for answer in answers if count[answer[0].problem] == len(scored)]
             for name, answers in scored.items()}
 
 
@@ -97,14 +97,14 @@ def of_real_machines(scored: Mapping[str, Scored]) -> str:
 
 
 def _named(effects: Sequence[Named]) -> str:
-    return ', '.join(one.name + (f' on {" ".join(one.drives)}' if one.drives else '')
-                     for one in effects)
+    return ', '.join(effect.name + (f' on {" ".join(effect.drives)}' if effect.drives else '')
+                     for effect in effects)
 
 
 def _said(answer: Answer) -> str:
     return ' or '.join(filter(None, (
         'unknown' if answer.verdict == 'unknown' else '',
-        *(_named(one) for one in answer.sets[:2]),
+        *(_named(effects) for effects in answer.sets[:2]),
         f'{len(answer.sets) - 2} more' if len(answer.sets) > 2 else ''))) or 'nothing'
 
 
@@ -143,7 +143,7 @@ def better_than_ours(scored: Mapping[str, Scored]) -> str:
     mine, said = all_figures(scored[ours]), []
     pairs = {name: alike({ours: scored[ours], name: answers}) for name, answers in scored.items()
              if sort_of(name) == PEER}
-    rates = {name: tuple(all_figures(pair[one]) for one in (name, ours))
+    rates = {name: tuple(all_figures(pair[entrant]) for entrant in (name, ours))
              for name, pair in pairs.items()}
     for figure in mine:
         sign = -1 if figure in LESS_IS_BETTER else 1
@@ -183,7 +183,7 @@ def _fails(truth: Truth, answer: Answer, judged: Judged) -> str:
         return 'a name for the unknown'
     if answer.verdict == 'unknown':
         return 'unknown for what has a name'
-    told, true = {one.name for one in answer.sets[0]}, set(truth.names)
+    told, true = {effect.name for effect in answer.sets[0]}, set(truth.names)
     return ('the effects and more' if told > true else 'some of them' if told & true else 'others')
 
 
@@ -205,8 +205,8 @@ def split_table(scored: Mapping[str, Scored], by: Callable[[Truth], str],
                 ) -> list[str]:
     """Return a rate for each sort of problem."""
     truths = [t for t, _, _ in next(iter(scored.values())) if not of or t.kind in of]
-    sorts = sorted({by(t) for t in truths}, key=lambda one: (
-        float(one.split()[-1]) if one.startswith('SNR') else 0.0, one))
+    sorts = sorted({by(t) for t in truths}, key=lambda label: (
+        float(label.split()[-1]) if label.startswith('SNR') else 0.0, label))
     lines = ['| entrant | ' + ' | '.join(sorts) + ' |', '|---' * (len(sorts) + 1) + '|']
     for name, answers in scored.items():
         lines.append(f'| {name} | ' + ' | '.join(_cell(Rate.of(
@@ -269,7 +269,7 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
     names = [name for name in scored if sort_of(name) != CONTROL]
     there = {truth.snr for answers in scored.values() for truth, *_ in answers
              if truth.kind == 'single'}
-    shown = [one for one in STRENGTHS if there & set(one)] or STRENGTHS
+    shown = [strength for strength in STRENGTHS if there & set(strength)] or STRENGTHS
     figure, panels = plt.subplots(1, len(shown), figsize=(12, 4.8), layout='constrained',
                                   sharex=True, sharey=True, squeeze=False)
     colours = plt.get_cmap('tab10')
@@ -282,14 +282,14 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
             right = Rate.of(j.exact for _, j in here)
             ours = sort_of(name) == OURS
             colour = 'black' if ours else colours(k % 10)
-            (left, up), (low, high) = ((100 * x for x in one.interval) for one in (wrong, right))
+            (left, up), (low, high) = ((100 * x for x in rate.interval) for rate in (wrong, right))
             x, y = 100 * wrong.share, 100 * right.share
             axes.plot([left, up], [y, y], '-', color=colour, lw=0.6, alpha=0.35)
             axes.plot([x, x], [low, high], '-', color=colour, lw=0.6, alpha=0.35)
             axes.plot([x], [y], '*' if ours else MARKERS[k % len(MARKERS)], color=colour,
                       ms=13 if ours else 7, alpha=0.85, mec='white', mew=0.5,
                       label=SHORT.get(_peer(name), _peer(name)))
-        axes.set(title='SNR ' + ', '.join(f'{one:g}' for one in strengths), xlim=(-3, 103),
+        axes.set(title='SNR ' + ', '.join(f'{snr:g}' for snr in strengths), xlim=(-3, 103),
                  ylim=(-3, 103), xlabel='claims that are wrong [%]')
         axes.grid(alpha=0.25)
     panels[0, 0].set_ylabel('one hidden effect, told exactly [%]')

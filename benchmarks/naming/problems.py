@@ -95,9 +95,9 @@ class Problem:
         with np.load(folder / 'columns.npz') as found:
             return cls(tuple(text['drives']), found['time'], found['error'],
                        found['base'].astype(float),
-                       tuple(Column(one['effect'], one['coefficient'], one['drive'],
-                                    tuple(sorted(one['shape'].items())))
-                             for one in text['columns']),
+                       tuple(Column(column['effect'], column['coefficient'], column['drive'],
+                                    tuple(sorted(column['shape'].items())))
+                             for column in text['columns']),
                        found['rows'].astype(float), folder)
 
 
@@ -156,21 +156,21 @@ class Answer:
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
         return {'verdict': self.verdict, 'seconds': self.seconds, 'error': self.error, 'sets': [
-            [{'name': one.name, 'drives': one.drives,
+            [{'name': effect.name, 'drives': effect.drives,
               'parameters': {key: {'value': value, 'std': std}
-                             for key, (value, std) in one.parameters.items()}}
-             for one in found] for found in self.sets]}
+                             for key, (value, std) in effect.parameters.items()}}
+             for effect in found] for found in self.sets]}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Answer:
         """Return an answer from JSON, or raise AnswerError saying what is wrong with it."""
         try:
             sets = tuple(tuple(Named(
-                str(one['name']), None if one.get('drives') is None else tuple(one['drives']),
+                str(e['name']), None if e.get('drives') is None else tuple(e['drives']),
                 {key: (float(value['value']),
                        None if value.get('std') is None else float(value['std']))
-                 for key, value in one.get('parameters', {}).items()})
-                for one in found) for found in data.get('sets', ()))
+                 for key, value in e.get('parameters', {}).items()})
+                for e in found) for found in data.get('sets', ()))
             return cls(str(data['verdict']), sets, float(data.get('seconds', 0.0)),
                        str(data.get('error', '')))
         except (KeyError, TypeError, AttributeError, ValueError) as error:
@@ -201,20 +201,20 @@ class Truth:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the effects."""
-        return tuple(one.name for one in self.effects)
+        return tuple(effect.name for effect in self.effects)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
         return {'problem': self.problem, 'robot': self.robot, 'kind': self.kind,
                 'noise': self.noise, 'snr': self.snr, 'effects': [
-                    {'name': one.name, 'drives': one.drives,
-                     'parameters': {key: value for key, (value, _) in one.parameters.items()}}
-                    for one in self.effects]}
+                    {'name': effect.name, 'drives': effect.drives,
+                     'parameters': {key: value for key, (value, _) in effect.parameters.items()}}
+                    for effect in self.effects]}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Truth:
         """Return what `to_dict` gave."""
         return cls(data['problem'], data['robot'], data['kind'], data['noise'], data['snr'], tuple(
-            Named(one['name'], None if one['drives'] is None else tuple(one['drives']),
-                  {key: (value, None) for key, value in one['parameters'].items()})
-            for one in data['effects']))
+            Named(effect['name'], None if effect['drives'] is None else tuple(effect['drives']),
+                  {key: (value, None) for key, value in effect['parameters'].items()})
+            for effect in data['effects']))

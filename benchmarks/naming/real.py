@@ -128,7 +128,7 @@ def _base(part: Part, data: Path, folder: Path) -> Path:
     # What is named by its whole path is ours, what is not lies beside the recording.
     model = data / part.model if isinstance(part.model, str) else folder / part.model(folder)
     for file in {*data.glob('*.urdf'), *model.parent.glob(f'{model.stem}.urdf'), model,
-                 *(data / one for one in part.fitted)}:
+                 *(data / name for name in part.fitted)}:
         if not (folder / file.name).exists():
             shutil.copy(file, folder)
     model = folder / model.name

@@ -73,10 +73,10 @@ def enter_all(folder: Path, entrants: Mapping[str, Entrant], workers: int,
         How many answers are still missing: where the time is up no more are begun.
     """
     until = time.monotonic() + 60 * minutes
-    keys = {name: one.key() for name, one in entrants.items()}
+    keys = {name: entrant.key() for name, entrant in entrants.items()}
     todo = []
     # In an order that mixes robots: what is there when it is stopped is a sample of all.
-    files = sorted((folder / TRUTH).glob('*.json'), key=lambda one: one.stem[::-1])
+    files = sorted((folder / TRUTH).glob('*.json'), key=lambda file: file.stem[::-1])
     for file in files[part[0] - 1::part[1]]:
         keys_here = {name: f'{key} {_key_of_problem(folder, file.stem)}'
                      for name, key in keys.items()}
@@ -163,14 +163,14 @@ def reveal(folder: Path, problem: str) -> int:
     for path in sorted((folder / ANSWERS).glob(f'*/{problem}.json')):
         answer = Answer.from_dict(json.loads(path.read_text()))
         sets = ' | '.join(', '.join(
-            one.name + (f'({" ".join(one.drives)})' if one.drives else '') for one in found)
+            e.name + (f'({" ".join(e.drives)})' if e.drives else '') for e in found)
             for found in answer.sets)
         print(f'{path.parent.name}: {answer.verdict} {sets}')
     return 0
 
 
 def _part(text: str) -> tuple[int, int]:
-    number, count = (int(one) for one in text.split('/'))
+    number, count = (int(part) for part in text.split('/'))
     if not 1 <= number <= count:
         raise ValueError(text)
     return number, count

@@ -65,20 +65,20 @@ def judge(truth: Truth, answer: Answer) -> Judged:
                       wrong_alone=answer.verdict == 'effect', sets=sets)
     true = truth.names
     best = answer.sets[0] if answer.sets else ()
-    told = [one.name for one in best]
-    both = [(one, next(t for t in truth.effects if t.name == one.name))
-            for one in best if one.name in true]
-    on_drives = [(one, t) for one, t in both if t.drives is not None]
+    told = [effect.name for effect in best]
+    both = [(effect, next(t for t in truth.effects if t.name == effect.name))
+            for effect in best if effect.name in true]
+    on_drives = [(effect, t) for effect, t in both if t.drives is not None]
     return Judged(
         first=told[:1] == [true[0]] if truth.kind in SINGLE else None,
-        named=any(set(true) <= {one.name for one in found} for found in answer.sets),
+        named=any(set(true) <= {effect.name for effect in found} for found in answer.sets),
         exact=sorted(told) == sorted(true) and answer.verdict != 'unknown',
         wrong_alone=answer.verdict == 'effect' and not set(told) & set(true),
-        drives=all(set(one.drives or ()) == set(t.drives or ()) for one, t in on_drives)
+        drives=all(set(effect.drives or ()) == set(t.drives or ()) for effect, t in on_drives)
         if on_drives else None,
         covered=tuple(
             abs(value - t.parameters[key][0]) <= COVERED * std
-            for one, t in both for key, (value, std) in one.parameters.items()
+            for effect, t in both for key, (value, std) in effect.parameters.items()
             if std is not None and key in t.parameters),
         sets=sets)
 
@@ -93,7 +93,7 @@ class Rate:
     @classmethod
     def of(cls, answers: Iterable[bool | None]) -> Rate:
         """Return the share of those that were asked."""
-        known = [one for one in answers if one is not None]
+        known = [answer for answer in answers if answer is not None]
         return cls(sum(known), len(known))
 
     @property
@@ -142,7 +142,7 @@ def figures(scored: Scored) -> dict[str, Rate]:
     """Return each figure of an entrant."""
     found = {name: Rate.of(asked(judged) for truth, _, judged in scored if chosen(truth))
              for name, chosen, asked, _ in FIGURES}
-    found['intervals hold'] = Rate.of(one for _, _, judged in scored for one in judged.covered)
+    found['intervals hold'] = Rate.of(hit for _, _, judged in scored for hit in judged.covered)
     return found
 
 

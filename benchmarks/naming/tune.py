@@ -31,8 +31,8 @@ def main() -> None:
     parser.add_argument('--workers', type=int, default=2)
     parser.add_argument('--minutes', type=float, default=np.inf)
     options = parser.parse_args()
-    tried = {f'{name}, {one.tuning[0]} {value:g}': one.set_to(value)
-             for name, one in PEERS.items() if one.tuning for value in one.tuning[1]}
+    tried = {f'{name}, {peer.tuning[0]} {value:g}': peer.set_to(value)
+             for name, peer in PEERS.items() if peer.tuning for value in peer.tuning[1]}
     if enter_all(options.folder, tried, options.workers, options.minutes):
         return
     scored = score_all(options.folder)

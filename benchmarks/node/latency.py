@@ -66,14 +66,14 @@ def main() -> int:
 def run(seconds: float) -> dict[str, Any]:
     """Stream for that long at each rate and return what was measured."""
     echo = [sys.executable, echo_node.__file__]
-    one, found = trajectory(1), dict[str, Any]()
+    path, found = trajectory(1), dict[str, Any]()
     with served(echo, '/echo', has_status=False) as (floor, _):
         domain = int(os.environ['ROS_DOMAIN_ID'])
-        found['start_s'] = [start_time(one, domain) for _ in range(3)]
+        found['start_s'] = [start_time(path, domain) for _ in range(3)]
         with served(feedforward('command_timeout:=0.0'), domain=domain) as (node, _):
             for rate in RATES:
-                found[f'{rate:g} Hz'] = in_turns(floor, node, one, rate, seconds)
-            found['sustained'] = {'echo': ceiling(floor, one), 'feedforward': ceiling(node, one)}
+                found[f'{rate:g} Hz'] = in_turns(floor, node, path, rate, seconds)
+            found['sustained'] = {'echo': ceiling(floor, path), 'feedforward': ceiling(node, path)}
             found['long_ms'] = long_trajectory(node)
         found['6-UPS'] = hexapod(seconds, domain)
     return found

@@ -68,7 +68,7 @@ def run(folder: Path) -> None:
     data = need_data('dvrk', FREE)
     folder.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
-    for name in ('psm.urdf', FREE, *(f'{one}.csv.gz' for one in LOADED)):
+    for name in ('psm.urdf', FREE, *(f'{stem}.csv.gz' for stem in LOADED)):
         if not Path(name).exists():
             shutil.copyfile(data / name, name)
     if not Path('psm.yaml').exists():
@@ -105,16 +105,16 @@ def draw() -> None:
     model = DriveModel.load('full.yaml')
     name = LOADED[0]
     said = json.loads(Path(f'{name}.json').read_text())['effects'][0]
-    values = {f'effects.{said["name"]}.{key}': one['value']
-              for key, one in said['parameters'].items() if one['value']}
+    values = {f'effects.{said["name"]}.{key}': number['value']
+              for key, number in said['parameters'].items() if number['value']}
     active = [*model.values.get('effects.active', ()), said['name']]
     loaded = type(model).from_parameters({**model.values, **values, 'effects.active': active},
                                          source=model.source)
     recording = read_recording(f'{name}.csv.gz', model.recorded)
     figure, axes = pyplot.subplots(figsize=(7.5, 2.8), layout='constrained')
-    for one, label, colour in ((model, 'without the weight', '#999999'),
-                               (loaded, 'with the reported body', '#0072B2')):
-        residuals = measure_residuals(one, [recording])[0]
+    for shown, label, colour in ((model, 'without the weight', '#999999'),
+                                 (loaded, 'with the reported body', '#0072B2')):
+        residuals = measure_residuals(shown, [recording])[0]
         axes.plot(residuals.time, residuals.error[:, 1], label=label, color=colour, lw=0.8)
     axes.set_xlim(5, 20)
     axes.set_ylim(-0.6, 1.0)

@@ -142,24 +142,24 @@ def document(story: Story) -> str:
     for (name, value), ours in zip(PUBLISHED.items(), found, strict=True):
         lines.append(f'| {name} [{UNITS[name]}] | {value} | {ours:.5g} | '
                      f'{100 * (ours / value - 1):+.2f} % |')
-    for what, value, one in zip(('identification', 'pulses'), PUBLISHED_ERRORS, (run, pulses),
-                                strict=True):
-        ours = published_error(one, found)
+    for what, value, recording in zip(('identification', 'pulses'), PUBLISHED_ERRORS, (run, pulses),
+                                      strict=True):
+        ours = published_error(recording, found)
         lines.append(f'| relative error, {what} run | {value} % | {ours:.2f} % | '
                      f'{ours - value:+.2f} |')
     for (name, value), ours in zip(PUBLISHED_ASYMMETRIC.items(), wide[1:3], strict=True):
         lines.append(f'| {name} [N s/m] | {value} | {ours:.4g} | '
                      f'{100 * (ours / value - 1):+.1f} % |')
-    with_both = [published_error(one, wide) for one in (run, pulses)]
+    with_both = [published_error(recording, wide) for recording in (run, pulses)]
     lines += [f'| relative error with both, identification run | {PUBLISHED_WITH_BOTH} % | '
               f'{with_both[0]:.2f} % | {with_both[0] - PUBLISHED_WITH_BOTH:+.2f} |',
               f'| relative error with both, pulses run | | {with_both[1]:.2f} % | |',
               '', '## What `pprs diagnose` names', '',
               '| candidate for the first place | evidence | error after [N] |', '|---|---|---|']
-    lines += [f'| {one.name} | {one.evidence:.0f} | {one.error_after:.3f} |'
-              for one in story.diagnosis.candidates]
+    lines += [f'| {candidate.name} | {candidate.evidence:.0f} | {candidate.error_after:.3f} |'
+              for candidate in story.diagnosis.candidates]
     lines += ['', f'Verdict on the published model: {story.diagnosis.verdict}; '
-              f'{", ".join(one.name for one in story.diagnosis.effects) or "no effect"}.', '',
+              f'{", ".join(effect.name for effect in story.diagnosis.effects) or "no effect"}.', '',
               '## Error along the loop', '',
               "By the authors' recipe, and as `pprs compare` reports it.", '',
               '| model | identification | pulses | `compare`, identification | `compare`, pulses |',
@@ -170,8 +170,8 @@ def document(story: Story) -> str:
     for outcome, name in ((story.blind, 'blocks'), (story.gated, 'pulses run')):
         rows += [(f'gated by {name}: + {step.effect}', step.after) for step in outcome.adopted]
     for name, model in rows:
-        figures = [f(model, one) for f in (error_of, compared) for one in (run, pulses)]
-        lines.append(f'| {name} | ' + ' | '.join(f'{one:.2f} %' for one in figures) + ' |')
+        figures = [f(model, recording) for f in (error_of, compared) for recording in (run, pulses)]
+        lines.append(f'| {name} | ' + ' | '.join(f'{figure:.2f} %' for figure in figures) + ' |')
     lines += ['', f'- Gated by blocks of the identification run: {_ending(story.blind)}',
               f'- Gated by the pulses run: {_ending(story.gated)}']
     if story.ripple is not None:

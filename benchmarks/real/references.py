@@ -46,11 +46,11 @@ def told(found: dict[str, Any]) -> str:
         return f'{found["verdict"]}: nothing, {len(found["depends_on"])} patterns'
     first, *others = effects
     known = {**first['parameters'], **(first.get('moments') or {})}
-    values = ', '.join(f'{key} {one["value"]:.3g} ± {2 * one["std"]:.2g}'
-                       for key, one in list(known.items())[:4] if one.get('std') is not None)
-    rivals = sorted({name for one in found['indistinguishable'] for name in one[1:]})
+    values = ', '.join(f'{key} {number["value"]:.3g} ± {2 * number["std"]:.2g}'
+                       for key, number in list(known.items())[:4] if number.get('std') is not None)
+    rivals = sorted({name for row in found['indistinguishable'] for name in row[1:]})
     return (f'{found["verdict"]}: **{first["name"]}** ({values})'
-            + (f'; beside it {", ".join(one["name"] for one in others)}' if others else '')
+            + (f'; beside it {", ".join(other["name"] for other in others)}' if others else '')
             + (f'; rivals {", ".join(rivals)}' if rivals else '')
             + f'; {len(found["depends_on"])} patterns; {found["processor_seconds"]:.0f} s')
 
@@ -88,10 +88,10 @@ def add_noise(model: DriveModel, clean: Path, noisy: Path, seed: int) -> None:
     """Write a recording with white noise of half a percent of each joint's largest effort."""
     if noisy.exists():
         return
-    one = read_recording(clean, model.recorded)
-    size = 0.005 * np.abs(one.effort).max(axis=0)
-    effort = one.effort + size * np.random.default_rng(seed).normal(size=one.effort.shape)
-    write_recording(noisy, replace(one, effort=effort))
+    quiet = read_recording(clean, model.recorded)
+    size = 0.005 * np.abs(quiet.effort).max(axis=0)
+    effort = quiet.effort + size * np.random.default_rng(seed).normal(size=quiet.effort.shape)
+    write_recording(noisy, replace(quiet, effort=effort))
 
 
 def simulated_arm(bench: Bench) -> list[list[str]]:

@@ -156,8 +156,8 @@ def zero_rows(bench: Bench, base: DriveModel) -> tuple[list[list[str]], int, int
             if not found:
                 continue
             first = (found['effects'] or [{'name': 'nothing'}])[0]
-            value = next((one['parameters'].get(f'{name}.{parameter}', {}).get('value')
-                          for one in found['effects'] if one['name'] == effect), None)
+            value = next((row['parameters'].get(f'{name}.{parameter}', {}).get('value')
+                          for row in found['effects'] if row['name'] == effect), None)
             is_first = value is not None and first['name'] == effect
             named += is_first
             right += is_first and abs(value / truth - 1) < 0.15
@@ -214,11 +214,11 @@ def ripple_rows(found: dict[str, Any]) -> tuple[list[list[str]], int]:
     rows, near = [], 0
     for effect in found['effects']:
         if effect['name'] == 'force_ripple':
-            for key, one in effect['parameters'].items():
+            for key, number in effect['parameters'].items():
                 if key.endswith('.pitch'):
-                    off = one['value'] / PITCH - 1
+                    off = number['value'] / PITCH - 1
                     near += abs(off) <= 0.005
-                    rows.append([key.removesuffix('.pitch'), f'{1e3 * one["value"]:.3f}',
+                    rows.append([key.removesuffix('.pitch'), f'{1e3 * number["value"]:.3f}',
                                  f'{1e3 * PITCH:.3f}', f'{100 * off:+.2f} %'])
     return rows, near
 
@@ -275,7 +275,7 @@ def tell(bench: Bench) -> dict[str, str]:
     hand = bench.run('hand', 'diagnose', file(HELD_OUT), '--model', 'hand.yaml')
     zeros, right, first_named = zero_rows(bench, base)
     bench.run('better', 'diagnose', file(FURTHER), '--model', 'base.yaml', '--adopt-all',
-              '--refit', *(file(one) for one in FITTED if one != GATE),
+              '--refit', *(file(name) for name in FITTED if name != GATE),
               '--output', 'better.yaml', '--validate', file(GATE))
     before, after = (bench.run(f'on_{name}', 'compare', file(HELD_OUT), '--model',
                                f'{name}.yaml') for name in ('base', 'better'))
@@ -283,9 +283,9 @@ def tell(bench: Bench) -> dict[str, str]:
     loads, load_first, load_near, load_held = load_rows(bench)
     count = 3 * len(loads)
     held = fit['held_out']
-    mass = next((one['parameters']['mass'] for one in load['effects']
-                 if one['name'] == 'payload_mass'), None)
-    claimed = {one['name'] for one in free.get('effects', ())} & {
+    mass = next((effect['parameters']['mass'] for effect in load['effects']
+                 if effect['name'] == 'payload_mass'), None)
+    claimed = {effect['name'] for effect in free.get('effects', ())} & {
         'payload_mass', 'effort_gain'}
     fall = (f'{100 * (1 - after["overall"]["rms"] / before["overall"]["rms"]):.0f} % lower'
             if before and after else 'not measured')
@@ -294,12 +294,12 @@ def tell(bench: Bench) -> dict[str, str]:
               zip(base.drives, GOALS, strict=True)]
     met = sum(held[name] <= goal for name, goal in zip(base.drives, GOALS, strict=True))
     first = load['effects'][0]['name'] if load['effects'] else 'nothing'
-    seconds = sorted(one['processor_seconds'] for one in (load, free) if one)
+    seconds = sorted(outcome['processor_seconds'] for outcome in (load, free) if outcome)
     value = 'none' if mass is None else (
         f'{told(mass)} ({100 * (mass["value"] / MASS - 1):+.1f} %, '
         f'{"holds" if holds(mass) else "does not hold"} {MASS} kg)')
     taken = first_mass(hand)
-    without_hand = ', '.join(one['name'] for one in hand.get('effects', ())) or 'not measured'
+    without_hand = ', '.join(effect['name'] for effect in hand.get('effects', ())) or 'not measured'
     proof = [
         ['the load is named first, mass within 3 %, its interval holds 2.805 kg', 'yes',
          f'{first} first; {value}'],
@@ -328,7 +328,7 @@ def tell(bench: Bench) -> dict[str, str]:
         'ZEROS': table(('joint', 'set to 0', 'was', 'named first', 'and where it is'), zeros),
         'LOADS': table(('base from', 'whole run', 'first half', 'second half'), loads),
         'RIPPLE': table(('joint', 'pitch [mrad]', 'of the gear', 'off'), ripples),
-        'FREE': ', '.join(one['name'] for one in free.get('effects', ())) or 'not measured',
+        'FREE': ', '.join(effect['name'] for effect in free.get('effects', ())) or 'not measured',
         'VERDICT': free.get('verdict', 'not measured'),
     }
 

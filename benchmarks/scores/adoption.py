@@ -57,8 +57,8 @@ class Robot:
         self.case = case
         self.place = hidden_recordings.scene(case.seed, case.width, case.duration)
         drawn = [hidden_recordings._draw(case, self.place, name) for name in case.effects]
-        self.effects: list[Choice] = [one.effect for one in drawn]
-        self.noise = min([one.noise for one in drawn], default=hidden_recordings.NOISE)
+        self.effects: list[Choice] = [d.effect for d in drawn]
+        self.noise = min([d.noise for d in drawn], default=hidden_recordings.NOISE)
         self.other = self.place.on_motion(case.seed + OTHER_MOTION)
 
     @property
@@ -180,9 +180,9 @@ def one_line(outcome: dict[str, Any]) -> str:
 def summary(outcomes: Sequence[dict[str, Any]]) -> str:
     """Return the shares that count."""
     count = len(outcomes)
-    ratios = np.array([one['error'] / one['best'] for one in outcomes])
+    ratios = np.array([outcome['error'] / outcome['best'] for outcome in outcomes])
     good = int(np.sum(ratios <= GOOD))
-    refused = sum(one['wrong_status'] == 1 for one in outcomes)
+    refused = sum(outcome['wrong_status'] == 1 for outcome in outcomes)
     return (f'{good} of {count} ({good / count:.0%}, wanted {WANTED:.0%}) within {GOOD} of the '
             f'best fit of the own form; ratio median {np.median(ratios):.3f}, largest '
             f'{ratios.max():.3f}\n{refused} of {count} ({refused / count:.0%}, wanted '
@@ -197,7 +197,7 @@ def main() -> int:
     parser.add_argument('--snr', type=float, default=1.0)
     parser.add_argument('--duration', type=float, default=40.0, help='of recordings [s]')
     options = parser.parse_args()
-    cases = {one[0].name: one for one in draw_cases(
+    cases = {case[0].name: case for case in draw_cases(
         options.cases, options.first, options.snr, options.duration)}
     print(summary(outcomes_of(options, outcome_of, cases,
                               lambda outcome: outcome['name'], one_line)))

@@ -77,25 +77,25 @@ def run_case(case: tuple[str, int], model: Path, duration: float, beside: Sequen
         return {'effect': effect, 'seed': seed, 'seconds': seconds,
                 'truth': json.loads(Path(truth).read_text())['effects'],
                 'verdict': found['verdict'], 'sets': found['indistinguishable'],
-                'effects': [{key: one[key] for key in ('name', 'drives', 'parameters')}
-                            for one in found['effects']]}
+                'effects': [{key: e[key] for key in ('name', 'drives', 'parameters')}
+                            for e in found['effects']]}
 
 
 def judge(outcome: Outcome) -> dict[str, bool]:
     """Return what is right about an outcome, as `diagnosis_table.judge` has it for the 3-PPRS."""
-    named = [one['name'] for one in outcome['effects']]
+    named = [effect['name'] for effect in outcome['effects']]
     name = outcome['effect']
     if not name:
         return {'claimed': bool(named) or outcome['verdict'] != 'adequate'}
     if '+' in name:
         true, size = name.split('+'), str(name.count('+') + 1)
         matched = len(true) == len(named) and all(
-            one in named or any(one in alike and set(alike) & set(named)
-                                for alike in outcome['sets']) for one in true)
+            name in named or any(name in alike and set(alike) & set(named)
+                                 for alike in outcome['sets']) for name in true)
         return {'exact ' + size: sorted(true) == sorted(named), 'matched ' + size: matched}
-    in_set = any(name in one for one in outcome['sets'])
+    in_set = any(name in names for names in outcome['sets'])
     first = named[:1] == [name]
-    told = next((one['drives'] for one in outcome['effects'] if one['name'] == name), None)
+    told = next((effect['drives'] for effect in outcome['effects'] if effect['name'] == name), None)
     true = outcome['truth'][0]['drives']
     judged = {'first_or_set': first or in_set, 'exact': named == [name],
               'wrong_alone': bool(named) and name not in named and not in_set}
@@ -114,24 +114,24 @@ def described(outcome: Outcome) -> str:
 
 
 def _on(outcome: Outcome) -> str:
-    return '; '.join(', '.join(one['drives'] or ()) for one in outcome['truth']).strip('; ')
+    return '; '.join(', '.join(effect['drives'] or ()) for effect in outcome['truth']).strip('; ')
 
 
 def _said(outcome: Outcome) -> str:
-    return '; '.join(one['name'] + (f'({", ".join(one["drives"])})' if one['drives'] else '')
-                     for one in outcome['effects'])
+    return '; '.join(e['name'] + (f'({", ".join(e["drives"])})' if e['drives'] else '')
+                     for e in outcome['effects'])
 
 
 def by_effect(told: Sequence[tuple[Outcome, dict[str, bool]]]) -> list[str]:
     """Return a table with a row for each hidden effect, and where its name stood wrongly."""
-    singles = [(one, judged) for one, judged in told if '+' not in one['effect']]
+    singles = [(outcome, judged) for outcome, judged in told if '+' not in outcome['effect']]
     lines = ['', '| hidden | first or in the named set | right joints | claimed where another is '
              'hidden, or nothing |', '|---|---|---|---|']
-    for name in sorted({one['effect'] for one, _ in singles} - {''}):
-        own = [judged for one, judged in singles if one['effect'] == name]
-        others = [one for one, _ in singles if one['effect'] != name]
+    for name in sorted({outcome['effect'] for outcome, _ in singles} - {''}):
+        own = [judged for outcome, judged in singles if outcome['effect'] == name]
+        others = [outcome for outcome, _ in singles if outcome['effect'] != name]
         drives = [judged['drives'] for judged in own if 'drives' in judged]
-        wrong = sum(name in [each['name'] for each in one['effects']] for one in others)
+        wrong = sum(name in [each['name'] for each in outcome['effects']] for outcome in others)
         lines.append(f'| `{name}` | {sum(judged["first_or_set"] for judged in own)} of {len(own)} '
                      f'| {f"{sum(drives)} of {len(drives)}" if drives else "-"} | '
                      f'{wrong} of {len(others)} |')
@@ -143,13 +143,13 @@ def by_pair(found: Sequence[Outcome]) -> str:
 
     Right is first or in the named set; as the other, where the other is named and it is not.
     """
-    told = [(one, judge(one)) for one in found if 'failed' not in one]
+    told = [(outcome, judge(outcome)) for outcome in found if 'failed' not in outcome]
 
     def counted(name: str, other: str) -> str:
-        own = [(one, judged) for one, judged in told if one['effect'] == name]
+        own = [(outcome, judged) for outcome, judged in told if outcome['effect'] == name]
         right = sum(judged['first_or_set'] for _, judged in own)
-        taken = sum(other in [each['name'] for each in one['effects']]
-                    and not judged['first_or_set'] for one, judged in own)
+        taken = sum(other in [each['name'] for each in outcome['effects']]
+                    and not judged['first_or_set'] for outcome, judged in own)
         return f'{right} of {len(own)} | {taken}'
 
     lines = ['| hidden | right | as the other | the other | right | as the first |',
@@ -161,7 +161,7 @@ def by_pair(found: Sequence[Outcome]) -> str:
 
 def table(found: Sequence[Outcome]) -> str:
     """Return the table in Markdown, then each effect that was not found, or not alone."""
-    told = [(one, judge(one)) for one in found if 'failed' not in one]
+    told = [(outcome, judge(outcome)) for outcome in found if 'failed' not in outcome]
     lines = ['| figure | goal | found |', '|---|---|---|']
     for text, goal, what in (
             ('true effect first or in the named set', '≥ 98 %', 'first_or_set'),
@@ -181,11 +181,11 @@ def table(found: Sequence[Outcome]) -> str:
     if failed:
         lines.append(f'| refused or failed | 0 | {failed} |')
     lines += ['', '| hidden | on | said |', '|---|---|---|']
-    for one, judged in told:
+    for outcome, judged in told:
         if judged.get('claimed') or not all(
                 right for what, right in judged.items() if what.startswith('exact')):
-            lines.append(f'| {one["effect"] or "nothing"} | {_on(one) or "the robot"} | '
-                         f'{one["verdict"]}: {_said(one) or "nothing"} |')
+            lines.append(f'| {outcome["effect"] or "nothing"} | {_on(outcome) or "the robot"} | '
+                         f'{outcome["verdict"]}: {_said(outcome) or "nothing"} |')
     return '\n'.join(lines) + '\n'
 
 

@@ -86,7 +86,7 @@ def run_missing(each: Each, work: Callable[[Any], Outcome], cases: Mapping[Any, 
         with file.open('a') as stream:
             stream.write('\n')  # after a line that was cut short
     done = {name(outcome) for outcome in read_outcomes(file)}
-    for case, outcome, error in each(work, (one for key, one in cases.items() if key not in done)):
+    for case, outcome, error in each(work, (c for key, c in cases.items() if key not in done)):
         if error is not None:
             # Its worker was killed, or the like: it is tried again the next time.
             print(f'LOST {case}: {error}', flush=True)

@@ -36,7 +36,7 @@ ROWS = {'effects': 'good', 'pairs': 'good', 'forms': 'exact', 'unknown': 'good',
 # What changes words and warnings only.
 TOLD = ('suspect_margin', 'statement_share', 'noise_accuracy', 'good', 'poor', 'sure', 'edge_share',
         'short', 'few_samples', 'unexcited', 'one_way', 'filtered')
-NUMBERS = tuple(one.name for one in fields(Decisions) if one.name not in TOLD)
+NUMBERS = tuple(field.name for field in fields(Decisions) if field.name not in TOLD)
 # A case, the number that is changed, and by what.
 Changed = tuple[Case, str, float]
 
@@ -48,7 +48,7 @@ def changes() -> list[tuple[str, float]]:
 
 def chosen_cases(first: int, seeds: int) -> list[Case]:
     """Return cases of most kinds, few enough to be run with every change."""
-    found = [one for one in cases(('nothing',), seeds, seeds, (), first) if one.noise in SLOWEST]
+    found = [case for case in cases(('nothing',), seeds, seeds, (), first) if case.noise in SLOWEST]
     for seed in range(first, first + seeds):
         found += cases(('effects',), 1, 0, WEAK, seed)[seed % EVERY::2 * EVERY]
         found += cases(('pairs',), 1, 0, (), seed)[::EVERY][:SETS]
@@ -69,9 +69,9 @@ def run_changed(changed: Changed, recordings: Path) -> Outcome:
 def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
     """Return, for each number, what is right with it halved, as it is, and doubled."""
     groups: dict[tuple[str, float], list[dict[str, Any]]] = {}
-    for one in outcomes:
-        if 'failed' not in one:
-            groups.setdefault((one['number'], one['factor']), []).append(one)
+    for outcome in outcomes:
+        if 'failed' not in outcome:
+            groups.setdefault((outcome['number'], outcome['factor']), []).append(outcome)
     lines = ['| number | value | halved | doubled |', '|---|---|---|---|',
              f'| as they are | | {_counts(groups.get(AS_IT_IS, []))} | |']
     lines += [f'| {name.replace("_", " ")} | {getattr(DECISIONS, name):g} | '
@@ -83,8 +83,8 @@ def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
 def _counts(outcomes: Sequence[dict[str, Any]]) -> str:
     shares = []
     for row, right in ROWS.items():
-        own = [one for one in outcomes if one['row'] == row]
-        shares.append(f'{sum(bool(one["judged"][right]) for one in own)}/{len(own)}')
+        own = [outcome for outcome in outcomes if outcome['row'] == row]
+        shares.append(f'{sum(bool(outcome["judged"][right]) for outcome in own)}/{len(own)}')
     return ', '.join(shares)
 
 
@@ -99,8 +99,8 @@ def main() -> int:
             for case in chosen_cases(options.first, options.seeds)
             for number, factor in changes()}
     found = outcomes_of(options, partial(run_changed, recordings=options.recordings), todo,
-                        lambda one: f'{one["name"]} {one["number"]} {one["factor"]}',
-                        lambda one: f'{one["number"]} x {one["factor"]:g}: {one_line(one)}')
+                        lambda o: f'{o["name"]} {o["number"]} {o["factor"]}',
+                        lambda o: f'{o["number"]} x {o["factor"]:g}: {one_line(o)}')
     print('Right of weak effects, of sets of two and three, exactly right of forms that are off, '
           'right of what is in no catalogue, and of nothing missing:\n')
     print(make_table(found))

@@ -209,8 +209,8 @@ def main() -> None:
     seeds = range(options.first_seed, options.first_seed + options.recordings)
     cases = {(*row, seed): (*row, seed) for row in rows for seed in seeds}
     found = outcomes_of(options, outcome_of, cases, name_of,
-                        lambda one: ' '.join(map(str, one.values())))
-    said = {name_of(one): one['said'] for one in found}
+                        lambda outcome: ' '.join(map(str, outcome.values())))
+    said = {name_of(outcome): outcome['said'] for outcome in found}
     for name, kind in rows:
         every = [said[name, kind, seed] for seed in seeds if (name, kind, seed) in said]
         texts = [text for text in every if text]

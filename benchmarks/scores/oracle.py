@@ -44,7 +44,7 @@ def consult(selection: ModelTable, truth: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     own = fits.refined(fits.evaluate((EffectCandidate.of(chosen),)))
     base = replace(nothing, fit=fits.regression.at((), own.fit.amplitudes))
-    rivals = [fits.refined(fits.evaluate(one)).cost
-              for one in scan.proposals(base, RIVALS) if one[0].name != effect.name]
+    rivals = [fits.refined(fits.evaluate(proposal)).cost
+              for proposal in scan.proposals(base, RIVALS) if proposal[0].name != effect.name]
     return {'best_error': linear_error(fits, own),
             'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

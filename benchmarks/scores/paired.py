@@ -51,7 +51,7 @@ def draws(seed: int, count: int, kinds: Sequence[str] = KINDS,
         size = {'nothing': 0, 'unknown': 0, 'two': 2, 'three': 3}.get(kind, 1)
         if robot == 'axis' and size > 1:
             size, kind = 1, 'single'
-        chosen = tuple(str(one) for one in rng.choice(names, size, replace=False))
+        chosen = tuple(str(name) for name in rng.choice(names, size, replace=False))
         snr = float(rng.choice(SNRS))
         snr = max(snr, STRONG if kind in ('form', 'unknown') else 1.0 if size > 1 else 0.0)
         yield Draw(robot, kind, chosen, 0.0 if kind == 'nothing' else snr,
@@ -81,7 +81,7 @@ def answer(problem: Path) -> dict[str, Any]:
 
 def grade(truth: dict[str, Any], said: dict[str, Any]) -> int:
     """Return how right an answer is: 3 exactly, 2 in doubt of it, 1 in part, 0 not at all."""
-    told, true = sorted(one['name'] for one in said['effects']), sorted(truth['names'])
+    told, true = sorted(effect['name'] for effect in said['effects']), sorted(truth['names'])
     if truth['kind'] == 'nothing':
         return 3 if said['verdict'] == 'adequate' else 0
     if truth['kind'] == 'unknown':
@@ -91,22 +91,22 @@ def grade(truth: dict[str, Any], said: dict[str, Any]) -> int:
         return 3 if said['verdict'] == 'effect' else 2
     rivals = [set(names) for names in said['indistinguishable']]
     if len(told) == len(true) and all(
-            name in told or any(name in one for one in rivals) for name in true):
+            name in told or any(name in rival for rival in rivals) for name in true):
         return 2
     return 1 if set(told) <= set(true) and told else 0
 
 
 def beside(folder: Path, before: Path, after: Path) -> None:
     """Print both answers to every problem where they differ, and the counts."""
-    old, new = ({one['name']: one for one in read_outcomes(file)} for file in (before, after))
+    old, new = ({o['name']: o for o in read_outcomes(file)} for file in (before, after))
     counts = {'worse': 0, 'same': 0, 'better': 0}
     exact, seconds = np.zeros(2, dtype=int), np.zeros(2)
     for name in sorted(set(old) & set(new)):
         truth = json.loads((folder / name / 'truth.json').read_text())
-        grades = [grade(truth, one[name]['said']) for one in (old, new)]
-        seconds += [one[name]['seconds'] for one in (old, new)]
+        grades = [grade(truth, outcomes[name]['said']) for outcomes in (old, new)]
+        seconds += [outcomes[name]['seconds'] for outcomes in (old, new)]
         exact += np.array(grades) == 3
-        told = [_said(one[name]['said']) for one in (old, new)]
+        told = [_said(outcomes[name]['said']) for outcomes in (old, new)]
         key = 'same' if grades[0] == grades[1] else 'better' if grades[1] > grades[0] else 'worse'
         counts[key] += 1
         if told[0] != told[1]:
@@ -117,7 +117,7 @@ def beside(folder: Path, before: Path, after: Path) -> None:
 
 
 def _said(said: dict[str, Any]) -> str:
-    named = ', '.join(one['name'] for one in said['effects']) or '-'
+    named = ', '.join(effect['name'] for effect in said['effects']) or '-'
     rivals = '; '.join(' ~ '.join(names) for names in said['indistinguishable'])
     return f'{said["verdict"]}: {named}' + (f' ({rivals})' if rivals else '')
 
@@ -141,9 +141,9 @@ def main() -> int:
         make(options.folder, options.seed,
              draws(options.seed, options.count, kinds, options.robots))
     if options.answers:
-        done = {one['name'] for one in read_outcomes(options.answers)}
-        todo = [one for one in sorted(options.folder.iterdir()) if one.name not in done
-                and (one / 'truth.json').exists()]
+        done = {outcome['name'] for outcome in read_outcomes(options.answers)}
+        todo = [folder for folder in sorted(options.folder.iterdir()) if folder.name not in done
+                and (folder / 'truth.json').exists()]
         for problem in todo[:options.most]:
             outcome = answer(problem)
             with options.answers.open('a') as stream:

@@ -69,7 +69,7 @@ class Change:
 
     def told(self, found: Diagnosis) -> dict[str, bool]:
         """Return what is right about a diagnosis."""
-        names = [one.name for one in found.effects]
+        names = [effect.name for effect in found.effects]
         if not self.effect:
             return {'alone': not names and found.verdict == 'adequate'}
         first = found.effects[0] if names[:1] == [self.effect] else None
@@ -123,10 +123,10 @@ def score(seeds: int, drift: float, path: int) -> list[dict[str, Any]]:
                 found = diagnose(base, [run], reference=reference)
                 for key, right in change.told(found).items():
                     counts[key] = counts.get(key, 0) + right
-                beside += sum(one.name != change.effect for one in found.effects)
+                beside += sum(effect.name != change.effect for effect in found.effects)
             rows.append({'change': change.effect or 'nothing', 'value': change.value,
                          **counts, 'beside': beside})
-            print(' | '.join(str(one) for one in rows[-1].values()), flush=True)
+            print(' | '.join(str(value) for value in rows[-1].values()), flush=True)
         return rows
 
 

@@ -195,7 +195,7 @@ class Robot:
         if drawn:
             run = simulate_mechanism(self.model, (change.effect,), seed, noise=0.0,
                                duration=self.duration, path_seed=path)
-            truth = [dict(one) for one in run.effects]
+            truth = [dict(effect) for effect in run.effects]
         else:
             change = replace(change, value=self.sized(change))
             run = simulate_mechanism(self._changed(change), (), seed, noise=0.0,
@@ -207,7 +207,7 @@ class Robot:
         effort, time_ = run.effort + self.healthy(run), run.motion.time
         assert time_ is not None
         if change.effect == 'time_delay':
-            effort = np.stack([np.interp(time_ - change.value, time_, one) for one in effort.T],
+            effort = np.stack([np.interp(time_ - change.value, time_, curve) for curve in effort.T],
                               axis=1)
         noise = noise_like(np.random.default_rng((seed, 1)), effort.shape)
         return Recording.from_arrays(
@@ -247,8 +247,8 @@ def told(found: Diagnosis, seconds: float) -> dict[str, Any]:
     content = found.to_dict()
     return {'verdict': content['verdict'], 'sets': content['indistinguishable'],
             'seconds': seconds, 'reference': content.get('reference'),
-            'effects': [{key: one[key] for key in ('name', 'drives', 'parameters')}
-                        for one in content['effects']]}
+            'effects': [{key: effect[key] for key in ('name', 'drives', 'parameters')}
+                        for effect in content['effects']]}
 
 
 def outcome_of(robot: Robot, reference: Reference, change: Change, seed: int, path: int,
@@ -266,16 +266,16 @@ def outcome_of(robot: Robot, reference: Reference, change: Change, seed: int, pa
 
 def judged(outcome: Outcome, key: str) -> dict[str, float]:
     """Return what is right about one of the two answers."""
-    one = {**outcome, **outcome[key]}
-    names = [each['name'] for each in one['effects']]
-    found = dict(judge({**one, 'truth': one['truth'] or [{'drives': None}]}))
+    since = {**outcome, **outcome[key]}
+    names = [each['name'] for each in since['effects']]
+    found = dict(judge({**since, 'truth': since['truth'] or [{'drives': None}]}))
     found['false'] = sum(name != outcome['effect'] for name in names)
     if not outcome['effect']:
         return {'adequate': not found['claimed'], 'false': found['false']}
     true = outcome['truth'][0]
     if names[:1] == [outcome['effect']]:
         for parameter, value in true['parameters'].items():
-            said = one['effects'][0]['parameters'].get(parameter)
+            said = since['effects'][0]['parameters'].get(parameter)
             if said and said.get('std') is not None and np.isscalar(value):
                 found['holds'] = abs(said['value'] - value) <= 2 * said['std']
     return found
@@ -285,7 +285,7 @@ def described(outcome: Outcome) -> str:
     """Return what was hidden and what was said, in a line."""
     return f'{outcome["name"]} {outcome["seed"]} path {outcome["path"]}: ' + '; '.join(
         f'{key}: {outcome[key]["verdict"]} '
-        + (', '.join(one['name'] for one in outcome[key]['effects']) or '-')
+        + (', '.join(effect['name'] for effect in outcome[key]['effects']) or '-')
         + f' {outcome[key]["seconds"]:.0f} s' for key in ('new', 'old') if key in outcome)
 
 
@@ -293,21 +293,21 @@ def table(found: Sequence[Outcome]) -> str:
     """Return a row for each change: of both answers, how often what is first, alone, and so on."""
     lines = ['| change | runs | | first | first or in the named set | alone | holds | beside it |',
              '|---|---|---|---|---|---|---|---|']
-    names = list(dict.fromkeys((one['path'], one['name']) for one in found))
+    names = list(dict.fromkeys((outcome['path'], outcome['name']) for outcome in found))
     for path, name in names:
         for key, label in (('new', 'since the reference'), ('old', 'without')):
-            own = [one for one in found
-                   if (one['path'], one['name']) == (path, name) and key in one]
+            own = [outcome for outcome in found
+                   if (outcome['path'], outcome['name']) == (path, name) and key in outcome]
             if not own:
                 continue
-            right = [judged(one, key) for one in own]
-            first = sum([each['name'] for each in one[key]['effects']][:1] == [one['effect']]
-                        for one in own)
-            cells = [first if own[0]['effect'] else sum(one['adequate'] for one in right)]
+            right = [judged(outcome, key) for outcome in own]
+            first = sum([each['name'] for each in o[key]['effects']][:1] == [o['effect']]
+                        for o in own)
+            cells = [first if own[0]['effect'] else sum(outcome['adequate'] for outcome in right)]
             for what in ('first_or_set', 'exact', 'holds'):
-                known = [one[what] for one in right if what in one]
+                known = [outcome[what] for outcome in right if what in outcome]
                 cells.append(f'{sum(known)} of {len(known)}' if known else '')
-            cells.append(f'{sum(one["false"] for one in right):g}')
+            cells.append(f'{sum(outcome["false"] for outcome in right):g}')
             lines.append(f'| {name}{f", path {path}" if path else ""} | {len(own)} | {label} | '
                          + ' | '.join(map(str, cells)) + ' |')
     return '\n'.join(lines)
@@ -339,7 +339,7 @@ def main() -> int:
              for k, (change, seed) in enumerate(changes(
                  robot.model, options.kinds or (), options.effects, options.seeds))}
     run_missing(here, lambda case: outcome_of(robot, reference, *case), cases, file,
-                lambda one: (one['name'], one['seed'], one['path']), described)
+                lambda outcome: (outcome['name'], outcome['seed'], outcome['path']), described)
     print(table(read_outcomes(file)))
     return 0
 

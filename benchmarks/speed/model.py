@@ -70,7 +70,7 @@ def one_sample(
     def theirs(peer: PinocchioPeer | MujocoPeer) -> Callable[[], None]:
         def run() -> None:
             for row in flat:
-                peer.one(*row)
+                peer.forces_of_sample(*row)
         return run
 
     found = _rounds({'model, with friction': ours, **{p.name: theirs(p) for p in peers}}, rounds)

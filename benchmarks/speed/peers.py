@@ -39,7 +39,8 @@ class Peer:
         # The same for all chains at once, to broadcast over samples.
         self.cos, self.sin, self.x, self.y = np.array(self.chains).T
 
-    def one(self, P: Any, quaternion: Any, v: Any, omega: Any, a: Any, epsilon: Any) -> np.ndarray:
+    def forces_of_sample(self, P: Any, quaternion: Any, v: Any, omega: Any, a: Any,
+                         epsilon: Any) -> np.ndarray:
         """Return the six drive forces of one sample; every argument is an array."""
         x, y, z, w = quaternion.tolist()
         rotation = (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
@@ -218,8 +219,8 @@ class PinocchioPeer(Peer):
             forces = np.empty((15, n), order='F')
             pin.rneaInParallel(1, self.pool, configuration, velocity, acceleration, forces)
             return forces.T
-        one, model, data = pin.rnea, self.model, self.data
-        return np.array([one(model, data, *row) for row in zip(
+        rnea, model, data = pin.rnea, self.model, self.data
+        return np.array([rnea(model, data, *row) for row in zip(
             configuration.T, velocity.T, acceleration.T, strict=True)])
 
     def all_in_base(self, rotation, forces) -> np.ndarray:

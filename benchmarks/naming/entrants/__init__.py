@@ -79,7 +79,7 @@ class Entrant:
 
     def _sources(self) -> list[Path]:
         own = sys.modules[self.method.__module__]
-        used = {own.__name__} | {str(getattr(one, '__module__', '')) for one in vars(own).values()}
+        used = {own.__name__} | {str(getattr(m, '__module__', '')) for m in vars(own).values()}
         files = [Path(str(sys.modules[name].__file__)) for name in sorted(used)
                  if name.startswith(f'{__name__}.')]
         if self.sort in (OURS, PART):
@@ -116,13 +116,13 @@ PEERS: dict[str, Entrant] = {
 def _with_tuned(peers: Mapping[str, Entrant]) -> dict[str, Entrant]:
     """Return peers by their defaults, and beside those that were tuned as they are then."""
     found = {}
-    for name, one in peers.items():
-        if one.settings.get('optimiser') == 'EvidenceGreedy' and not has_evidence_greedy():
+    for name, peer in peers.items():
+        if peer.settings.get('optimiser') == 'EvidenceGreedy' and not has_evidence_greedy():
             continue  # answers of another installation are scored as they are
-        found[name] = one
-        if one.tuned is not None:
-            assert one.tuning is not None
-            found[f'{name}, {one.tuning[0]} {one.tuned:g}'] = one.set_to(one.tuned)
+        found[name] = peer
+        if peer.tuned is not None:
+            assert peer.tuning is not None
+            found[f'{name}, {peer.tuning[0]} {peer.tuned:g}'] = peer.set_to(peer.tuned)
     return found
 
 

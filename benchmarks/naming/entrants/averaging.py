@@ -22,30 +22,30 @@ def model_averaging(problem: Problem, window: float = WINDOW, whiten: bool = Tru
     """Return the sets of effects that have posterior weight."""
     equations = Equations(problem, whiten)
     n, rng = len(equations.y), np.random.default_rng(0)
-    places = sorted({(one.effect, one.drive or '') for one in equations.groups})
-    shapes = {place: [one for one in equations.groups
-                      if (one.effect, one.drive or '') == place] for place in places}
+    places = sorted({(group.effect, group.drive or '') for group in equations.groups})
+    shapes = {place: [group for group in equations.groups
+                      if (group.effect, group.drive or '') == place] for place in places}
     prior = 2 * np.log(len(places))
     costs: dict[tuple[int, ...], float] = {}
-    at = {id(one): k for k, one in enumerate(equations.groups)}
+    at = {id(group): k for k, group in enumerate(equations.groups)}
 
     def cost(groups: list[Group]) -> float:
-        key = tuple(sorted(at[id(one)] for one in groups))
+        key = tuple(sorted(at[id(group)] for group in groups))
         if key not in costs:
-            columns = [k for one in groups for k in one.columns]
+            columns = [k for group in groups for k in group.columns]
             costs[key] = float(n * np.log(max(equations.fit(columns)[2], 1e-12) / n)
                                + len(columns) * np.log(n) + prior * len(groups))
         return costs[key]
 
     current: list[Group] = []
     gains = equations.gains([], equations.groups)
-    weights = np.array([max(gains[at[id(one)]] for one in shapes[place]) for place in places])
+    weights = np.array([max(gains[at[id(group)]] for group in shapes[place]) for place in places])
     weights = np.sqrt(np.maximum(weights, 1e-12))
     weights /= weights.sum()
     for _ in range(STEPS):
         place = places[int(rng.choice(len(places), p=weights))]
-        present = [one for one in current if (one.effect, one.drive or '') == place]
-        moved = [one for one in current if one not in present]
+        present = [group for group in current if (group.effect, group.drive or '') == place]
+        moved = [group for group in current if group not in present]
         if not present or rng.random() < 0.3:
             moved = [*moved, shapes[place][int(rng.integers(len(shapes[place])))]]
         if len(moved) <= 15 and np.log(rng.random()) < (cost(current) - cost(moved)) / 2:
@@ -62,4 +62,4 @@ def model_averaging(problem: Problem, window: float = WINDOW, whiten: bool = Tru
     answers = [equations.answered([equations.groups[k] for k in key]) for key in near[:10]]
     if answers[0].verdict == 'none' or len(answers) == 1:
         return answers[0]
-    return Answer('ambiguous', tuple(one.sets[0] for one in answers if one.sets))
+    return Answer('ambiguous', tuple(answer.sets[0] for answer in answers if answer.sets))

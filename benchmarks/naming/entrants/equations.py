@@ -76,8 +76,8 @@ class Equations:
             X.append(filtered[1 + len(of_base):])
         self.y, wide, of_model = (np.concatenate(y), np.concatenate(X, axis=1).T,
                                   np.concatenate(base, axis=1).T)
-        self.blocks = np.concatenate([np.arange(len(one)) * 10 // max(len(one), 1) for one in y])
-        self.drive = np.repeat(np.arange(len(y)), [len(one) for one in y])
+        self.blocks = np.concatenate([np.arange(len(e)) * 10 // max(len(e), 1) for e in y])
+        self.drive = np.repeat(np.arange(len(y)), [len(e) for e in y])
         # The model's numbers are as uncertain as their priors: unit precision beside the columns.
         gram = of_model.T @ of_model + np.eye(of_model.shape[1])
         self.y = self.y - of_model @ np.linalg.solve(gram, of_model.T @ self.y)
@@ -181,7 +181,7 @@ class Equations:
             gains = self.gains([k for group in chosen for k in group.columns], free)
             best = free[int(np.argmax(gains))]
             chosen.append(best)
-            free = [one for one in free if (one.effect, one.drive) != (best.effect, best.drive)]
+            free = [g for g in free if (g.effect, g.drive) != (best.effect, best.drive)]
         return chosen
 
 

@@ -22,12 +22,12 @@ def pprs(problem: Problem) -> Answer:
 
 def answer_of(said: dict[str, Any]) -> Answer:
     """Return the JSON of a diagnosis as an answer of the protocol."""
-    best = [Named(one['name'], None if one['drives'] is None else tuple(one['drives']),
+    best = [Named(effect['name'], None if effect['drives'] is None else tuple(effect['drives']),
                   {key: (value['value'], value['std'])
-                   for key, value in one['parameters'].items()}) for one in said['effects']]
+                   for key, value in effect['parameters'].items()}) for effect in said['effects']]
     sets = [tuple(best)] if best else []
     for alike in said['indistinguishable']:
-        at = next((k for k, one in enumerate(best) if one.name in alike), None)
+        at = next((k for k, effect in enumerate(best) if effect.name in alike), None)
         for name in alike:
             if at is not None and name != best[at].name:
                 plain = name.partition(':')[0]

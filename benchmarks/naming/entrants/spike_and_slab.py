@@ -36,10 +36,10 @@ def spike_and_slab(problem: Problem, odds: float = ODDS) -> Answer:
             current.pop(key, None)
             if len(current) >= MOST:
                 continue
-            columns = [k for one in current.values() for k in one.columns]
+            columns = [k for group in current.values() for k in group.columns]
             rest = max(equations.fit(columns)[2], 1e-12)
             gains = np.minimum(equations.gains(columns, places[key]), 0.999999 * rest)
-            sizes = np.array([len(one.columns) for one in places[key]])
+            sizes = np.array([len(group.columns) for group in places[key]])
             # ln of the marginal likelihood of each shape over that of none, with g = n.
             weight = (np.log(odds / len(places[key])) - sizes / 2 * np.log(1 + n)
                       - n / 2 * np.log1p(-gains / rest))
@@ -49,5 +49,5 @@ def spike_and_slab(problem: Problem, odds: float = ODDS) -> Answer:
                 current[key] = places[key][drawn]
         for key, group in current.items() if sweep >= DISCARDED else ():
             seen[key][group] = seen[key].get(group, 0) + 1
-    return equations.answered([max(found, key=lambda one: found[one]) for found in seen.values()
+    return equations.answered([max(found, key=lambda key: found[key]) for found in seen.values()
                                if sum(found.values()) > INCLUDED * (SWEEPS - DISCARDED)])

@@ -32,30 +32,30 @@ def split_test(problem: Problem, discoveries: float = DISCOVERIES, whiten: bool 
     for d, drive in enumerate(problem.drives):
         here = equations.drive == d
         fit, choose, test = (np.flatnonzero(here & (part == k)) for k in range(3))
-        groups = [one for one in equations.groups if one.drive in (drive, None)]
-        scored = sorted(((_left(equations, (one,), fit, choose), k)
-                         for k, one in enumerate(groups)))
+        groups = [group for group in equations.groups if group.drive in (drive, None)]
+        scored = sorted(((_left(equations, (group,), fit, choose), k)
+                         for k, group in enumerate(groups)))
         best = [((groups[k],), value) for value, k in scored[:1]]
         for a, b in combinations([groups[k] for _, k in scored[:PAIRED]], 2):
             if (a.effect, a.drive) != (b.effect, b.drive):
                 best.append(((a, b), _left(equations, (a, b), fit, choose)))
-        chosen = min(best, key=lambda one: one[1])[0]
-        columns = [k for one in chosen for k in one.columns]
+        chosen = min(best, key=lambda scored: scored[1])[0]
+        columns = [k for group in chosen for k in group.columns]
         X, y = equations.X[np.ix_(test, columns)], equations.y[test]
         rest = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
         free = max(len(y) - len(columns), 1)
         ratio = ((y @ y - rest @ rest) / len(columns)) / max(rest @ rest / free, 1e-12)
         tested.append((float(f_distribution.sf(ratio, len(columns), free)), chosen))
-    tested.sort(key=lambda one: one[0])
+    tested.sort(key=lambda scored: scored[0])
     passed = max((k + 1 for k, (p, _) in enumerate(tested)
                   if p <= discoveries * (k + 1) / len(tested)), default=0)
-    found = {(one.effect, one.drive): one for _, chosen in tested[:passed] for one in chosen}
+    found = {(g.effect, g.drive): g for _, chosen in tested[:passed] for g in chosen}
     return equations.answered(list(found.values()))
 
 
 def _left(equations: Equations, groups: tuple[Group, ...], fit: np.ndarray,
           choose: np.ndarray) -> float:
-    columns = [k for one in groups for k in one.columns]
+    columns = [k for group in groups for k in group.columns]
     X = equations.X[np.ix_(fit, columns)]
     gram = X.T @ X
     found = np.linalg.solve(gram + 1e-6 * max(np.trace(gram), 1e-9) * np.eye(len(columns)),

@@ -38,20 +38,20 @@ def _selected(equations: Equations, weight: float) -> list[Group]:
 
     current = cost(chosen)
     while len(chosen) < 20:
-        taken = {(one.effect, one.drive) for one in chosen}
-        free = [one for one in equations.groups if (one.effect, one.drive) not in taken]
+        taken = {(group.effect, group.drive) for group in chosen}
+        free = [group for group in equations.groups if (group.effect, group.drive) not in taken]
         if not free:
             break
-        gains = equations.gains([k for one in chosen for k in one.columns], free)
+        gains = equations.gains([k for group in chosen for k in group.columns], free)
         # Of each number of columns the best, as the penalty differs.
-        sizes = np.array([len(one.columns) for one in free])
+        sizes = np.array([len(group.columns) for group in free])
         best = min((cost([*chosen, free[int(k)]]), int(k)) for size in set(sizes)
                    for k in [np.flatnonzero(sizes == size)[np.argmax(gains[sizes == size])]])
         if best[0] >= current:
             break
         chosen, current = [*chosen, free[best[1]]], best[0]
-        for one in list(chosen):
-            without = [other for other in chosen if other is not one]
+        for removed in list(chosen):
+            without = [other for other in chosen if other is not removed]
             if cost(without) < current:
                 chosen, current = without, cost(without)
     return chosen
