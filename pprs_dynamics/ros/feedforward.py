@@ -55,7 +55,7 @@ except ImportError:  # then nothing is known of a controller
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
-LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
+ACKNOWLEDGE_TIME = Duration(seconds=0.3)  # that a listener gets to take the last command
 STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` gives none
 
 
@@ -235,9 +235,9 @@ class FeedforwardNode(ManagedNode):
                 if isinstance(effect, MeasuredCurve)
                 and (said := effect.left(answer.forces.mechanism))), '')
         left = self._margins
-        complaint = self._complaint
-        if complaint:
-            report('ERROR', 'CONTROLLER', complaint)
+        fault = self._controller_fault
+        if fault:
+            report('ERROR', 'CONTROLLER', fault)
         elif self._senders.take_turns:
             report('WARN', 'CONFLICT', 'the drives follow several publishers in turn, all on '
                    f'{self.resolve_topic_name(TRAJECTORY)}: {publishers_of(self, TRAJECTORY)}')
@@ -264,13 +264,13 @@ class FeedforwardNode(ManagedNode):
         return f'{self._joint_trajectory.topic_name.rpartition("/")[0]}/{STATE_TOPIC}'
 
     @property
-    def _complaint(self) -> str:
+    def _controller_fault(self) -> str:
         """That the controller of `~/joint_trajectory` does not follow; '' where none is known."""
         if not self._joint_trajectory.get_subscription_count() or not (
                 self._controller.was_heard
                 or self.count_publishers(self._controller_topic)):
             return ''
-        said = self._controller.complaint()
+        said = self._controller.fault()
         return f'{self._joint_trajectory.topic_name}: {said}' if said else ''
 
     def _on_controller(self, state: Any) -> None:
@@ -305,12 +305,12 @@ class FeedforwardNode(ManagedNode):
     # --- stale commands -------------------------------------------------------------------------
 
     def _on_stale(self, clock_stands: bool) -> None:
-        complaint, timeout = self._complaint, self._settings.node_values['command_timeout']
+        fault, timeout = self._controller_fault, self._settings.node_values['command_timeout']
         done = self._do_timeout_action()
         ended = self._feedforward.has_come_to_rest and not clock_stands
         self._counters['stale'] += not ended
-        if complaint:
-            self._status.report('ERROR', 'CONTROLLER', f'{complaint}; sent: {done}')
+        if fault:
+            self._status.report('ERROR', 'CONTROLLER', f'{fault}; sent: {done}')
         elif ended:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
         else:
@@ -318,7 +318,7 @@ class FeedforwardNode(ManagedNode):
                     else f'no valid trajectory for {timeout:g} s') + f': {done}'
             self._status.report('STALE', 'STALE', text)
 
-    def _last_word(self) -> None:
+    def _stop_work(self) -> None:
         """Do the timeout's action now where a command is in force, and see it off."""
         if self._watchdog is None or not self._watchdog.fresh:
             return
@@ -326,7 +326,7 @@ class FeedforwardNode(ManagedNode):
         self.get_logger().info(f'ends: {self._do_timeout_action()}')
         for each in (self._commands, self._joint_command, self._joint_trajectory, self._current):
             if each is not None:
-                each.wait_for_all_acked(LAST_WORD)
+                each.wait_for_all_acked(ACKNOWLEDGE_TIME)
 
     def _do_timeout_action(self) -> str:
         """Send what the action says on every topic, once, and return it in words.

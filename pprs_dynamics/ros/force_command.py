@@ -143,7 +143,7 @@ class DriveTrajectory(NamedTuple):
                 and bool((np.abs(self.effort[-1] - held.effort[0]) <= SAME_EFFORT).all()))
 
 
-class _Leaving(NamedTuple):
+class _Ramp(NamedTuple):
     """Model in force before a change, during the ramp to the present one.
 
     Parameters
@@ -154,7 +154,7 @@ class _Leaving(NamedTuple):
     scale : float
     since, duration : float
         [s]
-    earlier : _Leaving, optional
+    earlier : _Ramp, optional
         Ramp that was not complete at the change.
     """
 
@@ -163,7 +163,7 @@ class _Leaving(NamedTuple):
     scale: float
     since: float
     duration: float
-    earlier: _Leaving | None
+    earlier: _Ramp | None
 
     def is_over(self, now: float) -> bool:
         """Return whether the ramp is complete."""
@@ -205,7 +205,7 @@ class Feedforward:
     def __init__(self, model: DriveModel, node_values: Mapping[str, Any],
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._leaving: _Leaving | None = None
+        self._ramp: _Ramp | None = None
         self._scale: float = node_values['feedforward_scale']
         self._model: Any = model
         self._memory: ModelState | None = None
@@ -224,9 +224,9 @@ class Feedforward:
         ramp_time, scale = node_values.get('ramp_time', 0.0), node_values['feedforward_scale']
         if self._last is not None and self._memory is not None and (
                 scale != self._scale or model.fingerprint != self._model.fingerprint):
-            self._leaving = _Leaving(
+            self._ramp = _Ramp(
                 self._model, self._memory, self._scale, self._clock(), ramp_time,
-                self._leaving) if ramp_time else None
+                self._ramp) if ramp_time else None
         if self._memory is not None:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
@@ -405,27 +405,27 @@ class Feedforward:
 
     def _checked(self, request: TrajectoryRequest, forces: Forces) -> ForceCommand:
         effort = self._scale * forces.total if self._scales else forces.total
-        if self._leaving is not None:
-            effort = self._gone_over(request, effort)
+        if self._ramp is not None:
+            effort = self._ramped(request, effort)
         if self._limits.allow(effort, forces.drive_motion):
             return ForceCommand(request, forces, effort)
-        return self._looked_at(request, forces, effort)
+        return self._clamped(request, forces, effort)
 
-    def _gone_over(self, request: TrajectoryRequest, effort: Array) -> Array:
+    def _ramped(self, request: TrajectoryRequest, effort: Array) -> Array:
         """Return efforts (N, D) on the way from those before a change."""
-        leaving, now = self._leaving, self._clock()
-        if leaving is None or leaving.is_over(now):
-            self._leaving = None
+        ramp, now = self._ramp, self._clock()
+        if ramp is None or ramp.is_over(now):
+            self._ramp = None
             return effort
         try:
-            motion = self._timed(request) if leaving.memory.has_memory else request.motion
-            return leaving.blended(motion, request.offsets, effort, now)
-        except PprsError:  # the model of before cannot follow: there is nothing to go over from
-            self._leaving = None
+            motion = self._timed(request) if ramp.memory.has_memory else request.motion
+            return ramp.blended(motion, request.offsets, effort, now)
+        except PprsError:  # the model of before cannot follow: there is nothing to ramp from
+            self._ramp = None
             return effort
 
-    def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> ForceCommand:
-        """Return what goes out where something is not allowed, or raise what is wrong."""
+    def _clamped(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> ForceCommand:
+        """Return the command with clamped efforts; raise Rejection or LimitError where refused."""
         position, velocity, acceleration = forces.drive_motion
         for name, quantity in (('n effort', effort), (' drive velocity', velocity),
                                (' drive acceleration', acceleration)):

@@ -172,7 +172,7 @@ class MonitorNode(ManagedNode):
             f'answers lag by half the window of {self._settings.node_values["window"]:g} s; ready')
         return super().on_activate(state)
 
-    def _last_word(self) -> None:
+    def _stop_work(self) -> None:
         """End the process that diagnoses."""
         self._worker.close()
 

@@ -21,7 +21,7 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_parameters import follow
+from pprs_dynamics.ros.node.model_parameters import watch_parameters
 from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
@@ -109,7 +109,7 @@ class SimulatedRobotNode(Node):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
-        self._hidden = follow(self, self._validated, self._inject)
+        self._injected_effects = watch_parameters(self, self._validated, self._inject)
 
     def _validated(self, changes: list[Parameter]) -> dict[str, Any]:
         """Return the parameters of injected effects; all others stay as they were at the start."""
@@ -124,9 +124,9 @@ class SimulatedRobotNode(Node):
         return values
 
     def _inject(self, values: dict[str, Any], changes: list[Parameter]) -> None:
-        if values == self._hidden:
+        if values == self._injected_effects:
             return
-        self._hidden = values
+        self._injected_effects = values
         self._robot.plant.inject(*(values[name] for name in CHANGEABLE))
         self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
                                f'hidden effects: {self._injected()}')

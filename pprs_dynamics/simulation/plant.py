@@ -287,7 +287,7 @@ class Plant(Injecting):
         for _ in range(ROUNDS):
             mid = start + ahead * a
             C = np.einsum('kid,k,kie->de', rows, coefficients(rows @ mid), rows)
-            hidden, slope = self._hidden(position, mid)
+            hidden, slope = self._injected(position, mid)
             # A slope beside M: friction at the middle, linear with the secants of this round.
             damping = C + np.diag(slope)
             found = np.linalg.solve(M + ahead * damping, push - hidden - damping @ start)
@@ -319,7 +319,7 @@ class Plant(Injecting):
         return (mass + np.diag(self.model.robot.armature), self._load - mass @ acceleration,
                 rubbing.rows[0] @ T, lambda rates: rubbing.coefficients(rates[None])[0])
 
-    def _hidden(self, position: Array, velocity: Array) -> tuple[Array, Array]:
+    def _injected(self, position: Array, velocity: Array) -> tuple[Array, Array]:
         """Return injected forces that do not follow velocities, and slopes of those that do."""
         force, slope = np.zeros_like(position), np.zeros_like(position)
         for j, name, drawn, nominal in self._pushes:

@@ -44,7 +44,7 @@ class Cell:
                 self.watch.sent(np.stack([self.path(t) for t in ahead]), left, moves_at_end)
             if (position := reference(self.now)) is not None:
                 self.watch.heard(state(position, joints, efforts), sends)
-            said.append(self.watch.complaint())
+            said.append(self.watch.fault())
         return said
 
 

@@ -17,7 +17,7 @@ PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s�
 # Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
 ANYTHING = 100.0
 RESOLVED = 1e-9  # of any quantity in SI units, below which a number is rounding
-MOST_TOLD = 3  # drives of whose effort little is explained, in a sentence
+MOST_LITTLE = 3  # drives of whose effort little is explained, in a sentence
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
@@ -121,8 +121,8 @@ def word_little(little: Mapping[str, float], after: str = '') -> str:
         return ''
     said = [f'{_of_effort(share)} of the effort of {name}' if not place else
             f'{_of_effort(share)} of that of {name}'
-            for place, (name, share) in enumerate(list(little.items())[:MOST_TOLD])]
-    more = len(little) - MOST_TOLD
+            for place, (name, share) in enumerate(list(little.items())[:MOST_LITTLE])]
+    more = len(little) - MOST_LITTLE
     if more > 0:
         said.append(f'less than half of that of {more} more')
     return f'the model{after} explains {listed(said)}'

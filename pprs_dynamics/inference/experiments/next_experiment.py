@@ -40,7 +40,7 @@ SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
 # Effects that the same motion with a known mass more separates: one grows with it, the other does
 # not, or the mass appears too large.
-TOLD_BY_LOAD = tuple(map(frozenset, (
+SEPARATED_BY_LOAD = tuple(map(frozenset, (
     ('coulomb_friction', 'load_friction'), ('coulomb_friction', 'gear_efficiency'),
     ('payload_mass', 'external_wrench'), ('link_mass', 'external_wrench'),
     ('counterbalance', 'link_mass'), ('counterbalance', 'payload_mass'),
@@ -158,15 +158,15 @@ class Experiment:
         return tuple(pair for pair, is_separated in self.pairs.items() if not is_separated)
 
     @property
-    def told_by_load(self) -> tuple[tuple[str, str], ...]:
+    def separated_by_load(self) -> tuple[tuple[str, str], ...]:
         """Pairs that no motion separates, but the same motion with another load does."""
-        return tuple(pair for pair in self.fails if frozenset(pair) in TOLD_BY_LOAD)
+        return tuple(pair for pair in self.fails if frozenset(pair) in SEPARATED_BY_LOAD)
 
     @property
     def load(self) -> float | None:
         """Mass that the tool should carry more in a second recording [kg]; None: no need."""
         mass = self.model.robot.moved_mass
-        return float(f'{LOAD_SHARE * mass:.1g}') if self.told_by_load else None
+        return float(f'{LOAD_SHARE * mass:.1g}') if self.separated_by_load else None
 
     @property
     def text(self) -> str:
@@ -186,7 +186,7 @@ class Experiment:
             found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
                          'tried within these limits does so for sure.')
         if self.load:
-            found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
+            found.append(f'For {_listed(self.separated_by_load)} record the same motion once more '
                          f'with {self.load:g} kg more at the tool, and diagnose that recording '
                          'with this payload in the model.')
         return ' '.join(found)
@@ -196,7 +196,8 @@ class Experiment:
         found = {'separates': [list(pair) for pair in self.separates],
                  'does_not_separate': [list(pair) for pair in self.fails],
                  'expected_evidence': self.expected_evidence,
-                 'load': self.load, 'told_by_load': [list(pair) for pair in self.told_by_load],
+                 'load': self.load,
+                 'separated_by_load': [list(pair) for pair in self.separated_by_load],
                  'question': self.kind, 'subjects': list(self.subjects), 'text': self.text,
                  'contests': [vars(contest) for contest in self.contests],
                  'accuracy': [vars(accuracy) for accuracy in self.accuracies],

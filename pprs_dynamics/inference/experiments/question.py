@@ -120,8 +120,8 @@ def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Mot
     adopted, fits = table.reported, table.last
     if not adopted.effects:
         return commissioning(model, recordings, motions)
-    return _asked(ESTIMATE, fits.design, fits.regression, adopted.fit, motions,
-                  [_terms(adopted, (candidate,)) for candidate in adopted.effects])
+    return _question(ESTIMATE, fits.design, fits.regression, adopted.fit, motions,
+                     [_terms(adopted, (candidate,)) for candidate in adopted.effects])
 
 
 def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) -> Question:
@@ -144,8 +144,8 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
-    question = _asked(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, terms[:1],
-                      every)
+    question = _question(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, terms[:1],
+                         every)
     information, contests = question.information, []
     for (refitted, true), more in joined.items():
         free = information.places((*terms[refitted], *more))
@@ -205,7 +205,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
         design = Design.of(model, recordings)
         regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
-        return _asked(COMMISSION, design, regression, regression.fit(()), motions, subjects)
+        return _question(COMMISSION, design, regression, regression.fit(()), motions, subjects)
     series = motions.drawn(0, 1)[0]
     largest = np.abs(motions.forces(series, coarse_time(series)).total).max(axis=0)
     levels = np.maximum(NOISE_SHARE * largest, 1e-9) if noise is None else np.full(
@@ -242,9 +242,9 @@ def _common_terms(model: DriveModel) -> list[FittedTerm]:
     return terms
 
 
-def _asked(kind: str, design: Design, regression: Regression, fit: JointFit, motions: Motions,
-           subjects: Sequence[Sequence[FittedTerm]],
-           every: Sequence[Sequence[FittedTerm]] = ()) -> Question:
+def _question(kind: str, design: Design, regression: Regression, fit: JointFit, motions: Motions,
+              subjects: Sequence[Sequence[FittedTerm]],
+              every: Sequence[Sequence[FittedTerm]] = ()) -> Question:
     """Return a question after recordings, under the noise of a fit; `every`: all columns."""
     information = _information(design.given, design.model, motions, every or subjects,
                                regression.noise(fit))

@@ -18,7 +18,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import Reading
 from pprs_dynamics.inference.residuals.excerpt import PIECE, Excerpt, excerpt_of
-from pprs_dynamics.inference.residuals.reconstruction import follow
+from pprs_dynamics.inference.residuals.reconstruction import motion_of_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
@@ -232,7 +232,7 @@ def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     rigid, others = [], np.zeros_like(still)
     with np.errstate(all='ignore'):
         for each in (motion, replace(motion, velocity=still, acceleration=still)):
-            followed = follow(model, time, each).with_time(time)
+            followed = motion_of_drives(model, time, each).with_time(time)
             forces = model.drive_forces(followed)
             rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
                                 axis=0))

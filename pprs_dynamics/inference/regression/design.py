@@ -473,14 +473,14 @@ class Design:
                    shape: Mapping[str, float]) -> Array:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
-            def seen(recording: FullRate, part: slice) -> Array:
-                effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
-                                     effect)[0]
+            def sensor_columns(recording: FullRate, part: slice) -> Array:
+                effort = self.measured(recording.effort[None, part, drive], recording, part, drive,
+                                       effect)[0]
                 samples = recording.samples(part, drive)
                 return np.stack(effect.sensor_columns(effort, samples, **shape))
 
             return self.treated(lambda recording: np.concatenate(
-                [seen(recording, part) for part in recording.segments], axis=1))
+                [sensor_columns(recording, part) for part in recording.segments], axis=1))
 
         return self.shown(drive, lambda recording: recording.columns(effect, drive, shape))
 
@@ -488,7 +488,7 @@ class Design:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
         def behind_sensor(recording: FullRate) -> Array:
             whole = rows(recording)
-            return np.concatenate([self.sensed(whole[:, part], recording, part, drive)
+            return np.concatenate([self.measured(whole[:, part], recording, part, drive)
                                    for part in recording.segments], axis=1)
         return self.treated(behind_sensor)
 
@@ -497,8 +497,8 @@ class Design:
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 
-    def sensed(self, rows: Array, recording: FullRate, part: slice, drive: int,
-               without: type[CatalogueEffect] | None = None) -> Array:
+    def measured(self, rows: Array, recording: FullRate, part: slice, drive: int,
+                 without: type[CatalogueEffect] | None = None) -> Array:
         """Return forces (k, N) on a drive in a segment as the model's sensors show them.
 
         All but those of one kind.
@@ -546,7 +546,7 @@ class Design:
             if all(map(np.array_equal, old, moved)):
                 return None
             q, q_ddot, rubbing = np.concatenate([
-                recording.treat(self._felt(recording, drive, new - as_read).T).T
+                recording.treat(self._misreading_rows(recording, drive, new - as_read).T).T
                 for recording, as_read, new in zip(self.recordings, old, moved, strict=True)],
                 axis=1)
             return {d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
@@ -570,7 +570,7 @@ class Design:
             rows.append({d: row / step for d, row in best.items()})
         return {d: np.stack([row[d] for row in rows]) for d in range(len(self.drives))}
 
-    def _felt(self, recording: FullRate, drive: int, change: Array) -> Array:
+    def _misreading_rows(self, recording: FullRate, drive: int, change: Array) -> Array:
         """Return errors of position and acceleration, and what the drive's own friction makes.
 
         Of errors of position and its rates, (3, N) each.

@@ -75,7 +75,7 @@ def deviation_rows(design: Design, term: Term, units: Array) -> Array:
     d = term.drive
     if issubclass(effect, MeasurementEffect):
         def read(recording: FullRate) -> list[Array]:
-            parts = [np.stack(effect.sensor_deviations(design.sensed(
+            parts = [np.stack(effect.sensor_deviations(design.measured(
                 recording.effort[None, part, d], recording, part, d, effect)[0],
                 recording.samples(part, d), **term.shape)) for part in recording.segments]
             return [np.tile(row, (len(units), 1)) for row in np.concatenate(parts, axis=1)]

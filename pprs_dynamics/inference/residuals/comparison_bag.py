@@ -16,8 +16,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
+    measured_forces,
     reconstruct,
-    sensed_forces,
 )
 from pprs_dynamics.measurement.files.bag_files import write_bag
 from pprs_dynamics.measurement.files.recording import Recording
@@ -69,7 +69,7 @@ def _efforts(model: DriveModel, reconstruction: Reconstruction) -> dict[str, Arr
     """Return efforts by topic, (N, D); NaN where there is none."""
     shape = reconstruction.effort.shape
     efforts: dict[str, Array] = {}
-    for chunk, _, found in sensed_forces(model, reconstruction):
+    for chunk, _, found in measured_forces(model, reconstruction):
         for name, values in found.items():
             topic = MODEL if name == 'total' else f'{PARTS}/{name}'
             efforts.setdefault(topic, np.full(shape, np.nan))[chunk.samples] = values

@@ -140,8 +140,8 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def follow(model: DriveModel, time: Array, drives: DriveMotion,
-           progress: Progress | None = None) -> Motion:
+def motion_of_drives(model: DriveModel, time: Array, drives: DriveMotion,
+                     progress: Progress | None = None) -> Motion:
     """Return the motion, without times, that belongs to one of the drives.
 
     Parameters
@@ -283,14 +283,14 @@ def _followed_rightly(
 ) -> tuple[DriveMotion, Motion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
     if not model.misreadings:
-        return read, follow(model, time, read, progress)
+        return read, motion_of_drives(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
     if np.any(q_dot) and not all(misreading.is_of_position for misreading in model.misreadings):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
-    followed = follow(model, time, drives, progress)
+    followed = motion_of_drives(model, time, drives, progress)
     if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
         return drives, followed
     # Loads hardly change by what they do to positions: one step is enough.
@@ -302,7 +302,7 @@ def _followed_rightly(
         q, q_dot, q_ddot = model.windup_error(load, windup)
         drives = replace(drives, position=drives.position - q, velocity=drives.velocity - q_dot,
                          acceleration=drives.acceleration - q_ddot)
-    return drives, follow(model, time, drives, progress)
+    return drives, motion_of_drives(model, time, drives, progress)
 
 
 def _windup(recording: Recording, read: DriveMotion) -> Array | None:
@@ -343,7 +343,7 @@ def _efforts(model: DriveModel, recording: Recording) -> Array:
     return effort
 
 
-def sensed_forces(
+def measured_forces(
     model: DriveModel, reconstruction: Reconstruction,
 ) -> Iterator[tuple[Chunk, Any, dict[str, Array]]]:
     """Yield chunk by chunk what the model returns, and its efforts as the sensors would see them.
@@ -382,7 +382,7 @@ def treated_forces(
         See `DriveModel.drive_forces`.
     """
     treated: dict[Any, Array] = {}
-    for chunk, forces, efforts in sensed_forces(model, reconstruction):
+    for chunk, forces, efforts in measured_forces(model, reconstruction):
         means = {name: chunk.treat(values) for name, values in efforts.items()}
         for name, values in {**means, **more(forces, chunk.treat)}.items():
             if name not in treated:

@@ -30,7 +30,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AXES, AddedBody
 
-TOLD = 0.5  # of a coefficient's prior variance, below which the recordings tell it
+DETERMINED = 0.5  # of a coefficient's prior variance, below which the recordings determine it
 # Of the usual precision, for the centre of a body about which the set says nothing.
 FREE = 1e-2
 
@@ -107,7 +107,7 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
         It is on these drives for certain: somebody chose them.
     """
     slopes = dict(fits.slopes(fitted))
-    elsewhere = [] if are_drives_known else _told_elsewhere(fits, fitted, candidate)
+    elsewhere = [] if are_drives_known else _determined_on_other_drives(fits, fitted, candidate)
     centres = {component: _free_centre(fits, component, names)
                for component in candidate.components
                if (names := moments_left_out(component.effect, component.names))}
@@ -202,8 +202,8 @@ def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> 
     return replace(reported, parameters=parameters)
 
 
-def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
-                    ) -> list[Block]:
+def _determined_on_other_drives(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
+                                ) -> list[Block]:
     """Return an effect's columns on other drives whose coefficients are determined.
 
     That it is on some drives is a choice, and less certain than values given that choice: gains
@@ -221,7 +221,7 @@ def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCan
     fit = fits.regression.at((*fitted.fit.blocks, *blocks), fitted.fit.amplitudes)
     return [block for block in blocks if np.all(
         np.diag(fit.covariance[fit.places[block], fit.places[block]])
-        < TOLD * np.diag(np.linalg.inv(block.precision)))]
+        < DETERMINED * np.diag(np.linalg.inv(block.precision)))]
 
 
 def _left_out(fits: FittedSets, other: CandidateSet, candidate: EffectCandidate,

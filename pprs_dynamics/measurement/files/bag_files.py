@@ -30,6 +30,7 @@ from pprs_dynamics.measurement.files.merged_states import (
     read_channels,
     read_merged,
 )
+from pprs_dynamics.measurement.files.name_hints import MOST, missing_names
 from pprs_dynamics.measurement.files.samples import (
     QUANTITIES,
     Defect,
@@ -38,7 +39,6 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     whole_epoch,
 )
-from pprs_dynamics.measurement.files.way_out import MOST, missing_names
 from pprs_dynamics.system.files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
 

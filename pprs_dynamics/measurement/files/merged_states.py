@@ -27,6 +27,7 @@ from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import Bag, damaged
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
+from pprs_dynamics.measurement.files.name_hints import MOST
 from pprs_dynamics.measurement.files.samples import (
     CURRENT,
     QUANTITIES,
@@ -35,7 +36,6 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     whole_epoch,
 )
-from pprs_dynamics.measurement.files.way_out import MOST
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection

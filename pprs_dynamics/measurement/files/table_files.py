@@ -23,6 +23,7 @@ from pprs_dynamics.errors import UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import KINDS, ArrayTable, open_arrays
 from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.measurement.files.merged_states import at_stamps
+from pprs_dynamics.measurement.files.name_hints import MOST, init_command, missing_names
 from pprs_dynamics.measurement.files.samples import (
     CURRENT,
     QUANTITIES,
@@ -31,7 +32,6 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     whole_epoch,
 )
-from pprs_dynamics.measurement.files.way_out import MOST, init_command, missing_names
 from pprs_dynamics.system.plain_text import counted
 
 # The second is what PlotJuggler writes.

@@ -142,7 +142,7 @@ class ControllerWatch:
         self._hold_is_due = False
         return now
 
-    def complaint(self) -> str:
+    def fault(self) -> str:
         """Return that the controller does not follow, and the likely reason; '' where it does."""
         now = self._clock()
         _forget(self._sent, now - LOOKED_BACK)

@@ -49,8 +49,8 @@ class NoModelError(PprsError):
             'which is connected; -p demo:=true takes the paper\'s robot, for demonstrations')
 
 
-def follow(node: Node, validate: Callable[[list[Parameter]], Checked],
-           apply: Callable[[Checked, list[Parameter]], None]) -> Checked:
+def watch_parameters(node: Node, validate: Callable[[list[Parameter]], Checked],
+                     apply: Callable[[Checked, list[Parameter]], None]) -> Checked:
     """Check changes of a running node's parameters, bring them into force, and return the first.
 
     Parameters
@@ -167,7 +167,7 @@ class ModelParameters:
         self._stays: dict[str, Any] = {}
         self._files = files_given(arguments)
         self._node, self._declared = node, parameters
-        self.model, self.node_values = follow(node, self._validated, self._apply)
+        self.model, self.node_values = watch_parameters(node, self._validated, self._apply)
         # Whatever is connected would be driven by the forces of another robot.
         if not self.node_values[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())

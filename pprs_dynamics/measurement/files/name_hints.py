@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What to write where a file names its drives in a way of its own."""
+"""Hints for the model file where a recording uses other names than those of the drives."""
 
 from __future__ import annotations
 
