@@ -31,7 +31,7 @@ from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smoothing
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
-from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.simulation.injected_forms import read_thermometers
 from pprs_dynamics.simulation.injection import (

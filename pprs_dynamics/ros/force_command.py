@@ -18,10 +18,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.joint_motion import DrivePath, JointMotion
-from pprs_dynamics.physics.mechanism.pose_spline import load_splines
+from pprs_dynamics.physics.mechanism.motion import load_splines
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
-from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, write_joint_trajectory
 from pprs_dynamics.ros.messages.conversions import time as time_of
 from pprs_dynamics.ros.messages.status_codes import Rejection

@@ -14,7 +14,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import DrivePath
-from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.forces import DriveLimits
 
 # [m, m/s, N, ...]: no drive's; with more, products with gains would overflow, and differences of
 # what overflowed are no numbers.

@@ -13,8 +13,9 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.mechanism.description import REVOLUTE
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import REVOLUTE, SPHERICAL
+from pprs_dynamics.physics.three_pprs.robot import SPHERICAL
 from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, MJCF, described, written
 
 

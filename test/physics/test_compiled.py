@@ -14,6 +14,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -128,3 +129,15 @@ def _twice(values):
     for k in range(len(values)):
         total += 2.0 * values[k]
     return total
+
+
+def test_code_that_moves_to_another_module_is_compiled_anew():
+    """Stored code imports the modules that it came from, which may be there no longer."""
+    from pprs_dynamics.physics.mechanism import compilation
+
+    moved = FunctionType(_twice.__code__, _twice.__globals__)
+    before = compilation._fingerprint(_twice)
+    moved.__module__ = _twice.__module__
+    assert compilation._fingerprint(moved) == before
+    moved.__module__ = 'elsewhere'
+    assert compilation._fingerprint(moved) != before

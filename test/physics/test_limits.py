@@ -13,7 +13,7 @@ import pytest
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import LimitError, WorkspaceError
-from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.forces import DriveLimits
 
 PAPER = DriveModel.from_parameters({
     **DriveModel.load().values, 'limits.slide_stroke': [-0.3, 0.2],

@@ -13,8 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-from pprs_dynamics.physics.three_pprs.robot import ClosedForm, ThreePprs
+from pprs_dynamics.physics.three_pprs.robot import ClosedForm, Geometry, Masses, ThreePprs
 
 ELBOWS = ('up', 'down')
 REACH, TURN = 0.1, 0.2  # of the sampled workspace around home [m, rad]

@@ -22,7 +22,7 @@ from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
-from pprs_dynamics.physics.model.reference_keys import reference_files
+from pprs_dynamics.physics.model.parameter_values import reference_files
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
-from pprs_dynamics.physics.model.reference_keys import reference_files
+from pprs_dynamics.physics.model.parameter_values import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis

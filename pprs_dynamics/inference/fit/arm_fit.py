@@ -44,7 +44,7 @@ from pprs_dynamics.physics.mechanism.description import (
     pseudo_inertia,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
 

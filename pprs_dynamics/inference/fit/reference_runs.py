@@ -19,7 +19,7 @@ from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import values_before_changes
-from pprs_dynamics.physics.model.reference_keys import (
+from pprs_dynamics.physics.model.parameter_values import (
     ReferenceFile,
     reference_files,
     with_reference,

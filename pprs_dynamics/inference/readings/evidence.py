@@ -24,7 +24,7 @@ from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY
 

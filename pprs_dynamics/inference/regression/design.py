@@ -68,7 +68,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.model.parameter_values import effect_uncertainties

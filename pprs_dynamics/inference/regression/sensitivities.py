@@ -26,7 +26,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import PASSIVE_FRICTION, Forces
 from pprs_dynamics.physics.model.keys import GAIN

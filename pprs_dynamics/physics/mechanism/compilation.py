@@ -65,6 +65,8 @@ def _fingerprint(function: FunctionType) -> str:
         if isinstance(source, FunctionType) and source not in seen:
             seen.add(source)
             # A docstring is a constant, too, but nothing that is compiled depends on it.
+            # Stored code imports the modules that its functions came from.
+            content.update(source.__module__.encode())
             content.update(_code_text(source.__code__, source.__doc__).encode())
             waiting += [cell.cell_contents for cell in source.__closure__ or ()]
             for name in sorted(_names(source.__code__) & source.__globals__.keys()):

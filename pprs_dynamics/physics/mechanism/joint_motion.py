@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix, checked_times
-from pprs_dynamics.physics.mechanism.pose_spline import spline_through
+from pprs_dynamics.physics.mechanism.motion import checked_matrix, checked_times, spline_through
 
 GRID = 512  # points of a period at which peaks are looked for
 

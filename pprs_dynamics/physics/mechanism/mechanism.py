@@ -21,19 +21,18 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion, ToolPose
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import (
     MECHANISM,
     SLIDE,
     BodyPlace,
     MechanismState,
     PassiveJoint,
+    Reversal,
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.mechanism.tree_equations import (
     RIGID,
     WORST_CONDITION,

@@ -3,7 +3,10 @@
 
 """The state of a robot along a motion, as effects take it, and what it asks its robot for.
 
-Places and loads of effects are here as well.
+Places and loads of effects are here as well, and the smoothed sign of dry friction. A hard sign
+costs up to 0.9 N of spurious force at a reversal of the paper's robot, and it is undefined at rest.
+The paper takes "the modulus of the relative velocity" into account without a formula; here
+sgn(v) = tanh(v / v_rev), which is 0 at rest.
 """
 
 from __future__ import annotations
@@ -16,10 +19,38 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.system.parallel import lazy
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """Widths in which friction turns over when a motion reverses.
+
+    Parameters
+    ----------
+    velocity : float or sequence of 6 floats
+        Of all drives, or of each [m/s].
+    rate : float
+        Of the passive joints that turn [rad/s].
+    slide : float
+        Of passive slides [m/s].
+    """
+
+    velocity: float | tuple[float, ...] = 0.001
+    rate: float = 0.001
+    slide: float = 0.001
+
+    def widths(self, drives: int) -> Array:
+        """Return the width of each drive [m/s], (D,)."""
+        return np.broadcast_to(np.asarray(self.velocity, dtype=float), (drives,))
+
+
+def smooth_sign(velocity: Any, reversal_velocity: Any) -> Any:
+    """Return sgn(v) as tanh(v / v_rev); a width per column of (N, D) velocities is allowed."""
+    return np.tanh(velocity / reversal_velocity)
+
 
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
 PLATFORM, SLIDE, MECHANISM = 'platform', 'slide', 'mechanism'

@@ -47,8 +47,10 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     TRANSLATION,
     Integers,
     Model,
+    constraint_jacobian,
+    link_jacobians,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
+from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation
 from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
 X, Y, Z = range(3)
@@ -727,27 +729,15 @@ def _size(t: Model, q: Array) -> float:
 
 def _moves(structure: Structure) -> Array:
     """Return the tool's motion and that of all centres of mass per rate of each coordinate."""
-    t, size = structure.tables, structure.size
-    _, _, m = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
+    t, size, home = structure.tables, structure.size, structure.home
+    _, _, m = constraint_jacobian(t, home, np.arange(len(home)))
+    W, U = (each[0] for each in link_jacobians(t, m, np.eye(len(home))[None]))
     row, frame = structure.links[structure.tool]
-    points = [(row, m.p[0, row] + m.R[0, row] @ frame.p, True)]
+    moves = [(U[row] + np.cross(W[row], m.R[0, row] @ frame.p, axis=0)) / size, W[row]]
     for body, parameters in enumerate(structure.inertial):
         if parameters[0] > 0:
             centre = m.R[0, body] @ (parameters[1:4] / parameters[0])
-            points.append((body, m.p[0, body] + centre, False))
-    moves = []
-    for carrier, point, is_tool in points:
-        linear, angular = np.zeros((2, 3, len(structure.home)))
-        for j in path_to_base(t.parent, carrier):
-            c, z = int(t.coordinate[j]), t.ratio[j] * m.z[0, j]
-            if t.turns[j]:
-                angular[:, c] += z
-                linear[:, c] += np.cross(z, point - m.p[0, j])
-            else:
-                linear[:, c] += z
-        moves.append(linear / size if is_tool else SPIN * linear / size)
-        if is_tool:
-            moves.append(angular)
+            moves.append(SPIN * (U[body] + np.cross(W[body], centre, axis=0)) / size)
     return np.concatenate(moves)
 
 

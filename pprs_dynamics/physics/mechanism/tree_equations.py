@@ -28,7 +28,16 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
-from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, sqrt, times
+from pprs_dynamics.physics.mechanism.vectors import (
+    Vector,
+    dot,
+    minus,
+    plus,
+    product,
+    sign_over_speed,
+    sqrt,
+    times,
+)
 
 Integers = np.typing.NDArray[np.int_]
 
@@ -903,12 +912,118 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
             g = int(s.loop[k])
             relative = minus(vector(links, t.closures[g, LOOP_B], W),
                              vector(links, t.closures[g, LOOP_A], W))
-            speed = larger(length(relative), 1e-8 * s.width[k])
             dry = s.torque[k] + s.lever[k] * length(vector(o.loops, g, FORCE))
-            moment = times(s.viscous[k] + dry * tanh(speed / s.width[k]) / speed, relative)
+            moment = times(s.viscous[k] + dry * sign_over_speed(length(relative), s.width[k]),
+                           relative)
             for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
                 i = t.path[n, JOINT]
                 if t.joints[i, TURNS]:
                     of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
                         vector(links, i, Z), moment)
     project_to_actuators(t, m, of_tree, efforts)
+
+
+# Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
+# joints. Where rows are kept there is one for each sample, else one that all use in turn.
+MOTION, FORCES, KEPT = 1, 2, 4
+
+
+def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
+              given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
+              actuators: Any, closed: Any, efforts: Any, stages: int,
+              nearby: bool) -> int:
+    """Evaluate the stages at each sample in turn; see `Evaluation`.
+
+    Return the first sample that fails, or -1.
+    """
+    t = elements(read_tables(sizes, integers, reals))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
+    for s in range(len(closed)):
+        at = s if stages & KEPT else 0
+        m = elements(read_motion(sizes, motions[at], reals))
+        o = elements(read_loads(sizes, loads[at], reals))
+        if stages & MOTION:
+            q = given[0, s]
+            # First from coordinates of another motion, then from the last sample, then from home.
+            is_closed = False
+            for trial in range(0 if nearby and s == 0 else 1, 3):
+                if trial > 0 or is_near(t, start, q):
+                    is_closed = close_loops(t, m, start, q)
+                if is_closed:
+                    forward_kinematics(t, m, given[1, s], given[2, s])
+                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS
+                                     and is_regular_and_closed(t, m, at_home)):
+                        break
+                is_closed = False
+                for c in range(len(home)):
+                    start[c] = home[c]
+            if not is_closed:
+                return s
+            for c in range(len(home)):
+                closed[s, c] = start[c] = m.q[c]
+            if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
+                predict(t, m, given[0, s + 1], start)
+            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
+                return s
+        if stages & FORCES:
+            if not stages & KEPT:
+                for k in range(len(o.links)):
+                    for c in range(3):
+                        o.links[k, FORCE, c] = o.links[k, MOMENT, c] = 0.0
+            inverse_dynamics(t, m, inertial, gravity, o)
+            constraint_forces(t, m, o)
+            if not stages & KEPT:
+                own = efforts[:, s]
+                for d in range(given.shape[2]):
+                    own[TRANSMITTED, d] = o.efforts[d]
+                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                actuator_efforts(actuators, given[1, s], given[2, s], own)
+    return -1
+
+
+def oppose_friction(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
+         rubbing: Any, of_tree: Any, efforts: Any) -> None:
+    """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
+    t = elements(read_tables(sizes, integers, reals))
+    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
+                                      rubbing[5]))
+    for s in range(len(efforts)):
+        m = elements(read_motion(sizes, motions[s], reals))
+        o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
+        joint_friction(t, m, o, friction, efforts[s])
+
+
+def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
+    """Return all rows and their derivatives by some coordinates, (r,) and (r, K), at one place."""
+    sizes = packed_tables(t).sizes
+    m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
+    m.q[0] = q
+    sample = type(m)(*(array[0].data for array in m))
+    places = np.full((len(q), 2), -1)
+    places[columns, 0] = np.arange(len(columns))
+    update_frame_placements(t, sample)
+    residuals = np.array([residual(t, sample, r) for r in range(len(t.rows))])
+    J = np.zeros((len(t.rows), len(columns)))
+    jacobian(t, sample, places, J, np.empty((len(J), 0)))
+    return residuals, J, m
+
+
+def link_jacobians(t: Model, m: Data, rates: Array) -> tuple[Array, Array]:
+    """Return angular and linear velocity of links per unit of K motions, (N, J + 1, 3, K) each.
+
+    Parameters
+    ----------
+    t, m : Model, Data
+        Of N samples.
+    rates : (N, C, K) array
+        Of the coordinates in each motion.
+    """
+    W, U = np.zeros((2, len(rates), len(t.parent), 3, rates.shape[2]))
+    for j in range(1, len(t.parent)):
+        i = t.parent[j]
+        W[:, j] = W[:, i]
+        U[:, j] = U[:, i] + np.cross(W[:, i], (m.p[:, j] - m.p[:, i])[..., None], axis=1)
+        own = W if t.turns[j] else U
+        own[:, j] += t.ratio[j] * (m.z[:, j, :, None] * rates[:, t.coordinate[j], None, :])
+    return W, U

@@ -18,43 +18,22 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
     EFFORTS,
-    FORCE,
-    JOINT_EFFORT,
-    MOMENT,
+    FORCES,
+    KEPT,
+    MOTION,
     OF_DRIVE,
-    STEPS,
-    TRANSMITTED,
-    WARM_STEPS,
     WIDTH,
     Data,
-    Integers,
     JointFriction,
     Loads,
     Model,
-    actuator_efforts,
-    close_loops,
-    constraint_forces,
-    elements,
-    forward_kinematics,
-    inverse_dynamics,
-    is_near,
-    is_regular_and_closed,
-    jacobian,
-    joint_friction,
+    evaluate,
     length_of,
+    oppose_friction,
     packed_tables,
-    predict,
-    read_loads,
-    read_motion,
-    read_tables,
-    residual,
-    update_frame_placements,
     views,
 )
 
-# Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
-# joints. Where rows are kept there is one for each sample, else one that all use in turn.
-MOTION, FORCES, KEPT = 1, 2, 4
 NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
@@ -76,72 +55,6 @@ class InverseDynamicsResult(NamedTuple):
     q: Any
     efforts: Array
     motion: Any
-
-
-def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
-              given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              actuators: Any, closed: Any, efforts: Any, stages: int,
-              nearby: bool) -> int:
-    """Evaluate the stages at each sample in turn; see `Evaluation`.
-
-    Return the first sample that fails, or -1.
-    """
-    t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
-                                      rubbing[5]))
-    for s in range(len(closed)):
-        at = s if stages & KEPT else 0
-        m = elements(read_motion(sizes, motions[at], reals))
-        o = elements(read_loads(sizes, loads[at], reals))
-        if stages & MOTION:
-            q = given[0, s]
-            # First from coordinates of another motion, then from the last sample, then from home.
-            is_closed = False
-            for trial in range(0 if nearby and s == 0 else 1, 3):
-                if trial > 0 or is_near(t, start, q):
-                    is_closed = close_loops(t, m, start, q)
-                if is_closed:
-                    forward_kinematics(t, m, given[1, s], given[2, s])
-                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS
-                                     and is_regular_and_closed(t, m, at_home)):
-                        break
-                is_closed = False
-                for c in range(len(home)):
-                    start[c] = home[c]
-            if not is_closed:
-                return s
-            for c in range(len(home)):
-                closed[s, c] = start[c] = m.q[c]
-            if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
-                predict(t, m, given[0, s + 1], start)
-            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
-                return s
-        if stages & FORCES:
-            if not stages & KEPT:
-                for k in range(len(o.links)):
-                    for c in range(3):
-                        o.links[k, FORCE, c] = o.links[k, MOMENT, c] = 0.0
-            inverse_dynamics(t, m, inertial, gravity, o)
-            constraint_forces(t, m, o)
-            if not stages & KEPT:
-                own = efforts[:, s]
-                for d in range(given.shape[2]):
-                    own[TRANSMITTED, d] = o.efforts[d]
-                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
-                actuator_efforts(actuators, given[1, s], given[2, s], own)
-    return -1
-
-
-def _rub(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
-         rubbing: Any, of_tree: Any, efforts: Any) -> None:
-    """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
-    t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
-                                      rubbing[5]))
-    for s in range(len(efforts)):
-        m = elements(read_motion(sizes, motions[s], reals))
-        o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
-        joint_friction(t, m, o, friction, efforts[s])
 
 
 class Evaluation:
@@ -235,7 +148,7 @@ class Evaluation:
         """
         found = np.zeros((len(rows), len(self.tables.drives)))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        run(_rub, *self.packed, rows, loads.links, loads.loops, np.array(friction),
+        run(oppose_friction, *self.packed, rows, loads.links, loads.loops, np.array(friction),
             np.empty(len(self.home)), found)
         return found
 
@@ -276,7 +189,7 @@ class Evaluation:
              loads: Array | None = None, friction: JointFriction = NO_FRICTION,
              actuators: Array | None = None, closed: Array | None = None,
              efforts: Array | None = None) -> int:
-        """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
+        """Evaluate stages, and return the first sample that fails or -1; see `evaluate`."""
         if closed is None or efforts is None or actuators is None:
             closed, efforts, actuators = (
                 np.empty((len(rows), len(self.home))), self._no_efforts, self._no_actuators)
@@ -292,20 +205,5 @@ class Evaluation:
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
         return int(run(
-            _evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
+            evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
             gravity, loads, last[1], actuators, closed, efforts, stages, warm))
-
-
-def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
-    """Return all rows and their derivatives by some coordinates, (r,) and (r, K), at one place."""
-    sizes = packed_tables(t).sizes
-    m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
-    m.q[0] = q
-    sample = type(m)(*(array[0].data for array in m))
-    places = np.full((len(q), 2), -1)
-    places[columns, 0] = np.arange(len(columns))
-    update_frame_placements(t, sample)
-    residuals = np.array([residual(t, sample, r) for r in range(len(t.rows))])
-    J = np.zeros((len(t.rows), len(columns)))
-    jacobian(t, sample, places, J, np.empty((len(J), 0)))
-    return residuals, J, m

@@ -85,6 +85,14 @@ def sqrt(x: Any) -> float:
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
+def sign_over_speed(speed: Any, reversal_velocity: Any) -> Any:
+    """Return tanh(s / v_rev) / s for a number s >= 0, with its limit 1 / v_rev at rest."""
+    # Below 1e-8 the quotient equals its limit to rounding; dividing there would give 0 / 0.
+    smallest = 1e-8 * reversal_velocity
+    safe = smallest if speed < smallest else speed
+    return math.tanh(safe / reversal_velocity) / safe
+
+
 def plus(a: Vector, b: Vector) -> Vector:
     """Return a + b."""
     return Vector(a.x + b.x, a.y + b.y, a.z + b.z)

@@ -36,9 +36,8 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
-from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, Reversal
+from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
     FILES,
@@ -48,7 +47,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     title_of,
 )
-from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import (
     added_effects,

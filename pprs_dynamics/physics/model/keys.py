@@ -15,7 +15,6 @@ from functools import cache
 from typing import Any
 
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.three_pprs.geometry import ELBOWS
 
 EQUATIONS = ('corrected', 'printed')
 ANY = -1
@@ -125,7 +124,7 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('geometry.rod_length', 'l, length of the guiding rods', 'm', positive=True),
     Key('geometry.chain_angles', 'delta_i, chains around the base', 'rad', size=3),
     Key('geometry.platform_angles', "delta'_i, joints around the platform", 'rad', size=3),
-    Key('geometry.elbow', 'branch of the rods', choices=ELBOWS),
+    Key('geometry.elbow', 'branch of the rods', choices=('up', 'down')),
     Key('masses.platform', 'M, mass of the platform', 'kg', lower=0),
     Key('masses.payload', 'm, mass of the manipulated object', 'kg', lower=0),
     Key('masses.slides', 'm_1..m_3, masses of the slides', 'kg', size=3, lower=0),

@@ -36,8 +36,7 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.physics.model.parameter_values import LISTS, UNCERTAINTIES
-from pprs_dynamics.physics.model.reference_keys import REFERENCE
+from pprs_dynamics.physics.model.parameter_values import LISTS, REFERENCE, UNCERTAINTIES
 from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.package_files import located

@@ -1,13 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Values of a model's keys: known, each checked, and complete with defaults."""
+"""Values of a model's keys: known, each checked, and complete with defaults.
+
+Reference runs of a model file are the recordings of the day on which its numbers were right.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect, find_parameter
@@ -27,7 +31,46 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     title_of,
 )
-from pprs_dynamics.physics.model.reference_keys import check_reference
+
+REFERENCE = 'reference'
+HASHES = 'reference_sha256'
+REFERENCE_KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
+        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
+
+
+class ReferenceFile(NamedTuple):
+    """A reference run as a model file names it."""
+
+    path: Path
+    sha256: str
+
+
+def reference_files(values: Mapping[str, Any], source: str) -> tuple[ReferenceFile, ...]:
+    """Return the reference runs that values name, paths from the folder of their file."""
+    folder = Path(source).absolute().parent if source else Path()
+    return tuple(ReferenceFile(folder / name, sha256) for name, sha256 in zip(
+        values.get(REFERENCE, ()), values.get(HASHES, ()), strict=True))
+
+
+def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile]) -> dict[str, Any]:
+    """Return values that name reference runs, in place of others."""
+    new = {REFERENCE: [str(file.path) for file in files], HASHES: [file.sha256 for file in files]}
+    return {**{key: value for key, value in values.items() if key not in REFERENCE_KEYS},
+            **{key: value for key, value in new.items() if value}}
+
+
+def check_reference(parameters: Mapping[str, Any]) -> None:
+    """Raise ModelError for reference runs that are none."""
+    for key, value in parameters.items():
+        if key.partition('_')[0] != REFERENCE:
+            continue
+        if key not in REFERENCE_KEYS:
+            raise UnknownNameError('key', key, tuple(REFERENCE_KEYS))
+        REFERENCE_KEYS[key].check(value)
+    if len(parameters.get(REFERENCE, ())) != len(parameters.get(HASHES, ())):
+        raise ModelError(REFERENCE, list(parameters.get(REFERENCE, ())),
+                         f'have a SHA-256 each under {HASHES}: pprs fit writes both')
+
 
 UNCERTAINTIES = 'uncertainties'
 

@@ -30,9 +30,10 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
+from pprs_dynamics.physics.model.forces import DriveLimits
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
     FILES,
@@ -43,10 +44,9 @@ from pprs_dynamics.physics.model.keys import (
     below,
     blocks_below,
 )
-from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs import robot as three_pprs
-from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
+from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses
 from pprs_dynamics.system.package_files import located
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
@@ -61,7 +61,7 @@ def read_platform(values: Mapping[str, Any],
     blocks = {joint: {'viscous': values[f'friction.{joint}.viscous'],
                       'coulomb': values[f'friction.{joint}.coulomb'],
                       'radius': values[f'friction.{joint}.diameter'] / 2}
-              for joint in (three_pprs.REVOLUTE, three_pprs.SPHERICAL)}
+              for joint in (REVOLUTE, three_pprs.SPHERICAL)}
     is_independent = values['friction.approach'] == 'independent_chains'
     passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
                else ModelJointFriction(blocks))

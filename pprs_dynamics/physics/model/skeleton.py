@@ -14,7 +14,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.geometry import structure_of
+from pprs_dynamics.physics.three_pprs.robot import structure_of
 
 LINK, DRIVE = 'link', 'drive'
 JOINED = 1e-6  # of the robot's size: joints closer than that are one point

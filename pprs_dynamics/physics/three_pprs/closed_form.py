@@ -22,7 +22,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.evaluation import reader_of
-from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.physics.mechanism.tree_equations import (
     DRIVE_FRICTION,
     JOINT_EFFORT,
@@ -39,6 +38,7 @@ from pprs_dynamics.physics.mechanism.vectors import (
     motion_sample,
     plus,
     product,
+    sign_over_speed,
     sqrt,
     times,
     turned,

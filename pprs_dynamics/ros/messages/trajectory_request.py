@@ -17,8 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
+from pprs_dynamics.physics.mechanism.motion import FEWEST_POSES, PlatformMotion, spline_derivatives
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, RobotNames, nanoseconds
 from pprs_dynamics.ros.messages.incoming_bytes import message_in

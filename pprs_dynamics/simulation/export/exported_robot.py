@@ -28,7 +28,7 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, Loop, principal_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
+from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, ROBOT
 

@@ -16,8 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import OfPlace, StructureEffect
-from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, smooth_sign
 
 
 class CoupledDrives(StructureEffect):

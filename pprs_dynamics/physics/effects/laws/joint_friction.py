@@ -19,8 +19,7 @@ from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import OfPlace, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
-from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, Reversal
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 
