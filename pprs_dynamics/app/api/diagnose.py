@@ -35,6 +35,7 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     Sentences,
     detectable_rows,
     fitted_values,
+    is_refit,
     runner_up,
     set_rows,
     unexplained_groups,
@@ -51,8 +52,7 @@ if TYPE_CHECKING:
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_EFFECTS = 4  # rows and values without --details
 MOST_PLACES = 2  # of an unexplained error without --details
-REFIT = 'numbers of the model'  # fitted together with the effects
-LEAST_REFIT = 0.01  # share of the error, from which these are listed
+REFIT = 'model numbers'  # refitted together with the effects
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
 METHOD = (
@@ -114,8 +114,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield every effect, finding, table and list."""
     if diagnosis.effects:
-        yield _effects_table(diagnosis, effect_rows(diagnosis), frame='head',
-                             title=_held_out(diagnosis))
+        yield f'[bold]{escape(_held_out(diagnosis))}[/]'
+        yield _effects_table(diagnosis, effect_rows(diagnosis), frame='head')
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield f'[bold]{number}. {escape(finding.title)}[/]'
         yield _labelled([*finding_lines(finding), ('confirm', finding.confirm)], 8)
@@ -157,21 +157,22 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
 
 def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
     if rows := detectable_rows(diagnosis):
-        yield ('Smallest effects that would have been reported', 'Each alone would have cost 10 '
-               'less than the answer at the noise of these recordings.',
+        yield ('Smallest effects that would have been reported', 'Each of them '
+               'alone would have lowered the cost by 10.',
                (('effect', 'size'), rows))
 
 
 def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
-    return [('Suspects, which slow noise explains as well', words.suspects),
+    return [('Suspects: slow noise explains the data as well', words.suspects),
             ('Excluded sets', words.barred),
-            ('Calibrated within their tolerance', words.calibrated)]
+            ('Calibrated numbers of the model', words.calibrated)]
 
 
 def _held_out(diagnosis: Diagnosis) -> str:
-    return 'Effects by error reduction; held out: ' + (
-        'the --validate recordings' if diagnosis.held_out_on == 'validation'
-        else 'blocks of the same recordings')
+    data = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
+            else 'blocks of the same recordings')
+    return ('Effects, largest error reduction first. Held out: error on '
+            f'{data}, of the model refitted without and with the effect')
 
 
 def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -186,8 +187,8 @@ def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
          _fall(effect.error_before, effect.error_after),
          _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
         for effect in diagnosis.effects]
-    given = root_mean_square(diagnosis.residuals.error)
-    if abs(diagnosis.refit - given) > LEAST_REFIT * given:
+    if is_refit(diagnosis):
+        given = root_mean_square(diagnosis.residuals.error)
         rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))
     return rows
 
@@ -340,7 +341,7 @@ def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     for finding, group in zip(words.unexplained, unexplained_groups(diagnosis), strict=True):
         pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
                     for statement in group]
-        with page.fold(f'No effect explains: {finding.title}'):
+        with page.fold(finding.title[:1].upper() + finding.title[1:]):
             page.card(finding_lines(finding),
                       [(figure, text) for figure, text in pictures if figure is not None])
 
@@ -401,7 +402,7 @@ class DiagnosisResult(Result):
         residuals = self.diagnosis.residuals
         after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
         return plot_errors(
-            {'before': rms_by_drive(residuals), 'with what is missing': rms_by_drive(after),
+            {'before': rms_by_drive(residuals), 'with the reported effects': rms_by_drive(after),
              'noise': self.diagnosis.noise_floors}, residuals.unit)
 
     @cached_property

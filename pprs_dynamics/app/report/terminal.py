@@ -142,8 +142,9 @@ def plain_rows(table: PlainTable) -> PlainTable:
 
 
 def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None) -> Any:
-    """Return a table of plain text below its title."""
-    return text_table(*plain_rows(table), right=right, frame='head', title=escape(title))
+    """Return a table of plain text below its title, which may be wider than the table."""
+    return stacked(f'[bold]{escape(title)}[/]',
+                   text_table(*plain_rows(table), right=right, frame='head'))
 
 
 @contextmanager

@@ -42,8 +42,9 @@ def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
              for d, noise in regression.noise(best.fit).items()}
     poor = [design.drives[d] for d, count in worth.items() if count < fits.decisions.few_samples]
     if poor:
-        yield (f'slow noise on {listed(poor)}: the recording is worth {min(worth.values()):.0f} '
-               'independent samples, and constants are not separated from noise; repeat it')
+        count = round(min(worth.values()))
+        yield (f'the noise of {listed(poor)} is slow: for a constant force the recording is worth '
+               f'{count} independent sample{"s" * (count != 1)}. Record for longer')
 
 
 def _motion(fits: FittedSets) -> Iterator[str]:
@@ -69,7 +70,7 @@ def _reversals(fits: FittedSets, best: CandidateSet, noise_levels: Mapping[str, 
              if root_mean_square(forces[:, d]) > noise_levels[fits.design.drives[d]]]
     if wrong:
         yield (f'friction of {listed(wrong)} seems to reverse over another range of velocities '
-               'than in the model, and that part of the error remains: pprs fit estimates '
+               'than in the model, and that part of the error remains. `pprs fit` estimates '
                'friction.reversal_velocities')
 
 
@@ -144,6 +145,5 @@ def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
             if root_mean_square(rest) < fits.decisions.form_share * root_mean_square(force):
                 alike.append(design.drives[d])
         if alike:
-            yield (f'{effect.name} and {other.name} on {listed(alike)} differ by less than real '
-                   'friction differs from either, because the load hardly varies: record another '
-                   'load')
+            yield (f'{effect.name} and {other.name} cannot be separated on {listed(alike)}, '
+                   'because the load hardly varies. Record with another load')

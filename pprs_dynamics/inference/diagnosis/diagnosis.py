@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.efforts import kinds_of
@@ -171,8 +172,8 @@ class FoundEffect:
         if self.course is None:
             return ''
         if self.course.kind == SINCE:
-            return f' since {self.course.begin:.4g} s'
-        return f', growing from nothing at the start to this at {self.course.end:.4g} s'
+            return f' since {plain(self.course.begin, 2)} s'
+        return f', growing from zero at the start to this value at {plain(self.course.end, 2)} s'
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""

@@ -163,8 +163,8 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return REPEAT, both
     if diagnosis.verdict == 'ambiguous':
         if all(_need_another_load(names) for names in diagnosis.indistinguishable):
-            return ('Repeat the motion with another load: only friction by load grows with it. '
-                    'Diagnose that recording with the load in the model', other)
+            return ('Repeat the motion with another load, and write the load into the model file. '
+                    'Friction that depends on load grows with it', other)
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed:

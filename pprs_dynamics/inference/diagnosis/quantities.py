@@ -103,8 +103,14 @@ def change(before: float, after: float, unit: str = 'N') -> str:
     if after >= before:
         return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
                 'after)')
+    first, second = both_in_unit(before, after, unit)
+    return f'falls from {first} to {second}'
+
+
+def both_in_unit(before: float, after: float, unit: str = 'N') -> tuple[str, str]:
+    """Return two efforts with their unit, and with as many digits as show their difference."""
     digits = next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
-    return f'falls from {in_unit(before, unit, digits)} to {in_unit(after, unit, digits)}'
+    return in_unit(before, unit, digits), in_unit(after, unit, digits)
 
 
 def word_little(little: Mapping[str, float], after: str = '') -> str:

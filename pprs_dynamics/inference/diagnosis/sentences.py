@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isnan
@@ -12,6 +13,7 @@ from math import isnan
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
+    Drives,
     FoundEffect,
     RankedSet,
     RivalEffect,
@@ -21,6 +23,7 @@ from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
 from pprs_dynamics.inference.diagnosis.quantities import (
     INTERVAL,
     as_fitted,
+    both_in_unit,
     change,
     in_fitting_unit,
     in_unit,
@@ -34,7 +37,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
     describe_unexplained,
-    place_of,
+    pattern_over,
     place_on,
 )
 from pprs_dynamics.inference.search.candidates import CostTerms
@@ -53,6 +56,9 @@ MOSTLY = 0.95  # of a recording, from which on a reference covers its states
 # of up to 70 ms that it has not; a program repeats its own speeds to hundredths.
 ALIKE_PACE = 1.25
 COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')  # named as detectable
+MOST_PLACES = 2  # of an unexplained error in the headline
+MOST_SHARED = 2  # effects of the best set that another one of the table repeats
+LEAST_REFIT = 0.01  # share of the error by which refitted numbers matter
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -159,12 +165,25 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         diagnosis.warnings, following, command, word_reference(diagnosis.since))
 
 
+def is_refit(diagnosis: Diagnosis) -> bool:
+    """Return whether the refitted numbers of the model alone change the error visibly."""
+    given = root_mean_square(diagnosis.residuals.error)
+    return abs(diagnosis.refit - given) > LEAST_REFIT * given
+
+
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
-    """Return the unexplained statements, those of one pattern together."""
-    groups: dict[object, list[Statement]] = {}
+    """Return the unexplained statements in groups, which a reader looks at together.
+
+    One pattern on several drives, and patterns over one variable on the same drives.
+    """
+    patterns: dict[object, list[Statement]] = {}
     for statement in diagnosis.depends_on:
         key = (statement.variable, statement.kind, statement.range)
-        groups.setdefault(key, []).append(statement)
+        patterns.setdefault(key, []).append(statement)
+    groups: dict[object, list[Statement]] = {}
+    for alike in patterns.values():
+        drives = tuple(statement.drive for statement in alike)
+        groups.setdefault((drives, alike[0].variable), []).extend(alike)
     return [tuple(group) for group in groups.values()]
 
 
@@ -194,19 +213,37 @@ def word_detectable(diagnosis: Diagnosis) -> str:
 
 
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
+    return _names(diagnosis, Counter(ranked.names)) or 'nothing missing'
+
+
+def _names(diagnosis: Diagnosis, names: Counter[tuple[str, Drives]]) -> str:
+    """Return effects and patterns with their drives; patterns over one variable are counted."""
     found = []
-    for name, drives in ranked.names:
+    for (name, drives), count in names.items():
         unknown, _, variable = name.partition(', ')
         found.append(with_drives(
-            f'a pattern {place_of(variable)}' if variable and unknown == 'unknown' else name,
+            pattern_over(variable, count) if variable and unknown == 'unknown' else name,
             drives, diagnosis.residuals.drives))
-    return ' + '.join(found) or 'nothing missing'
+    return ' + '.join(found)
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return the best sets of effects in words, each with its cost above the best, and terms."""
-    return [(_set(diagnosis, fitted), _rise(fitted.cost) if number else 'the best',
-             word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
+    """Return the best sets of effects in words, each with its cost above the best, and terms.
+
+    Of sets that differ in shapes only the cheapest.
+    """
+    rows: dict[str, tuple[str, str, str]] = {}
+    best = Counter(diagnosis.sets[0].names) if diagnosis.sets else Counter()
+    for number, fitted in enumerate(diagnosis.sets):
+        names = Counter(fitted.names)
+        text = _set(diagnosis, fitted)
+        if number and (names & best).total() > MOST_SHARED:
+            less, more = _names(diagnosis, best - names), _names(diagnosis, names - best)
+            text = 'the best' + (f' without {less}' if less else '') + (
+                f'{", but" if less else ""} with {more}' if more else '')
+        rows.setdefault(text, (text, _rise(fitted.cost) if number else 'the best',
+                               word_terms(fitted.terms)))
+    return list(rows.values())
 
 
 def word_terms(terms: CostTerms) -> str:
@@ -271,17 +308,18 @@ def _headline(diagnosis: Diagnosis) -> str:
     residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
     is_noise = residual <= AT_NOISE * diagnosis.noise_floor
     lacking = _lacking(diagnosis)
-    fall = f'ith {"it" if len(effects) == 1 else "them"} the error ' + change(
+    refitted = ' and refitted numbers of the model' * is_refit(diagnosis)
+    fall = f'ith {"it" if len(effects) == 1 else "them"}{refitted} the error ' + change(
         root_mean_square(diagnosis.residuals.error), residual, unit)
     if diagnosis.unconfirmed and not effects and not diagnosis.depends_on:
         return 'No effect is supported by held-out data.' + ('' if is_noise else (
             f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
-    groups = unexplained_groups(diagnosis)
-    places = [*dict.fromkeys(place_on(group) for group in groups[:2])] or [
-        f'the error of {drive} is {ratio:.1f} times its noise'
-        for drive, ratio in diagnosis.above_noise.items()]
+    where = [place_on(group) for group in unexplained_groups(diagnosis)]
+    places = where[:MOST_PLACES] or [f'the error of {drive} is {ratio:.1f} times its noise'
+                                     for drive, ratio in diagnosis.above_noise.items()]
     if places:
-        places += [f'in {len(groups) - 2} more place{"s" * (len(groups) > 3)}'] * (len(groups) > 2)
+        if more := len(where[MOST_PLACES:]):
+            places.append(f'in {more} more place{"s" * (more > 1)}')
         return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
                 + (f' In addition, {lacking}; w{fall}.' if effects else ''))
     unseen = (f'the recording does not show how much of the error of '
@@ -347,13 +385,15 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
     if issubclass(effect.effect, MeasurementEffect):
         what += '. It describes the sensor, and is never used in a command'
     data = 'the --validate recordings' if is_validated else 'held-out blocks of the same recording'
-    why = (f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
-           f'On {data} it {change(effect.held_out_before, effect.held_out_after, unit)}'
-           f'{"" if is_validated else "; another motion with --validate is stronger evidence"}. '
-           f'Evidence {effect.evidence:.0f} (threshold 0).')
-    if effect.without is not None:
-        why += (f' The best set without it, {_set(diagnosis, effect.without)}, '
-                f'{_cost(effect.without)}.')
+    why = f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
+    if not isnan(effect.held_out_after):
+        before, after = both_in_unit(effect.held_out_before, effect.held_out_after, unit)
+        why += (f'Refitted without it, the model has an error of {before} on {data}; with it, '
+                f'{after}. ')
+        why += '' if is_validated else 'Another motion (--validate) is stronger evidence. '
+    why += f'Evidence {effect.evidence:.0f} (threshold 0)'
+    why += '.' if effect.without is None else (
+        f'; the best set without it: {_set(diagnosis, effect.without)}.')
     return Finding(title, f'{what}.', why, sentence(card.causes), sentence(card.confirm),
                    sentence(card.looks_like), tuple(_remarks(diagnosis, effect)))
 
@@ -446,8 +486,8 @@ def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
              f'{with_uncertainty(number.after, number.std, number.unit)}')
     tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
     if not tolerance:
-        return f'{moved}: calibrated'
+        return moved
     is_within = (abs(number.after - number.before)
                  <= tolerance * abs(number.before) + INTERVAL * number.std)
-    return (f'{moved}, within its tolerance of {tolerance:.0%}: calibrated, not an effect'
-            if is_within else f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first')
+    return (f'{moved} (tolerance {tolerance:.0%})' if is_within else
+            f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first')

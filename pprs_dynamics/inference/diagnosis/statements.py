@@ -32,6 +32,7 @@ UNITS = {
 }
 TURNING = {'position': (180 / np.pi, 'deg'), 'velocity': (1.0, 'rad/s'),
            'acceleration': (1.0, 'rad/s²'), 'load': (1.0, 'N m')}
+SHOWN = 2  # digits of forces and of ends of ranges, which are known to some percent
 # Possible causes, and how to look, by what the error depends on.
 LEADS = {
     'position': ('a dent, dirt or a joint in the guide or screw; something that touches there',
@@ -163,10 +164,10 @@ def _sentence(
 ) -> str:
     kind, residuals = pattern.kind, drive_patterns.residuals
     units = residuals.units_of(residuals.drives[drive_patterns.d])
-    effort, size = units.effort, plain(amplitude)
+    effort, size = units.effort, plain(amplitude, SHOWN)
     of = f'{share:.0%} of its squared error'
     if kind == 'offset':
-        return f'its mean error is {with_sign(signed)} {effort} ({of})'
+        return f'its mean error is {with_sign(signed, SHOWN)} {effort} ({of})'
     if kind == 'friction':
         amount = 'little' if signed > 0 else 'much'
         return (f'its error has the sign of the motion, {size} {effort} ({of}): the model has too '
@@ -180,12 +181,13 @@ def _sentence(
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
         low, high = _ends(drive_patterns, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {in_words(variable)}, from {with_sign(low)} {effort} at '
-                f'the lowest to {with_sign(high)} {effort} at the highest{opposed} ({of})')
+        return (f'its error changes with {in_words(variable)}, from '
+                f'{with_sign(low, SHOWN)} {effort} at the lowest to {with_sign(high, SHOWN)} '
+                f'{effort} at the highest{opposed} ({of})')
     place = _place(variable, pattern, drive_patterns)
     of += f' in {time:.0%} of the time'
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
-    return f'{place} its error is shifted by {with_sign(signed)} {effort}{along} ({of})'
+    return f'{place} its error is shifted by {with_sign(signed, SHOWN)} {effort}{along} ({of})'
 
 
 def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> str:
@@ -203,10 +205,13 @@ def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> st
         values, low = np.abs(values), max(low, 0.0)
     below, above = high < values.max(), low > values.min() and not (speed and low <= 0)
     if below and (not above or (word.startswith('speed') and low <= 0)):
-        return f'at a {word} below {plain(high * factor)} {unit}'
+        return f'at a {word} below {plain(high * factor, SHOWN)} {unit}'
     if above and not below:
-        return f'at a {word} above {plain(low * factor)} {unit}'
-    return f'at a {word} between {plain(low * factor)} and {plain(high * factor)} {unit}'
+        return f'at a {word} above {plain(low * factor, SHOWN)} {unit}'
+    digits = next((n for n in range(SHOWN, 6)
+                   if plain(low * factor, n) != plain(high * factor, n)), SHOWN)
+    return (f'at a {word} between {plain(low * factor, digits)} and '
+            f'{plain(high * factor, digits)} {unit}')
 
 
 def _ends(
@@ -223,22 +228,22 @@ def _ends(
 def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str, str]:
     """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
     first = group[0]
-    drives = listed([statement.drive for statement in group])
+    drives = list(dict.fromkeys(statement.drive for statement in group))
     texts = '; '.join(
-        statement.text if len(group) > 1 else statement.text.removeprefix(f'{statement.drive}: ')
+        statement.text if len(drives) > 1 else statement.text.removeprefix(f'{statement.drive}: ')
         for statement in group)
-    what = (f'The error of {drives}, {place_of(first.variable)}, has the form of no effect of the '
-            f'catalogue: {texts}.')
+    what = f'The error of {listed(drives)} has a form that no effect of the catalogue has: {texts}.'
     evidence = max(statement.evidence for statement in group)
-    why = (f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and every effect '
-           'of the catalogue explains it worse.')
+    why = (f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and no set of '
+           'effects explains it as well.')
     cause, confirm = LEADS[_lead(first.variable)]
-    return f'unknown {place_on(group)}', what, why, sentence(cause), sentence(confirm)
+    return f'unexplained error {place_on(group)}', what, why, sentence(cause), sentence(confirm)
 
 
 def place_on(group: Sequence[Statement]) -> str:
     """Return on which drives and depending on what a pattern lies."""
-    return f'on {listed([statement.drive for statement in group])}, {place_of(group[0].variable)}'
+    drives = list(dict.fromkeys(statement.drive for statement in group))
+    return f'on {listed(drives)}, {place_of(group[0].variable)}'
 
 
 def place_of(variable: str) -> str:
@@ -246,8 +251,15 @@ def place_of(variable: str) -> str:
     return 'at one frequency' if variable == 'frequency' else f'depending on {in_words(variable)}'
 
 
+def pattern_over(variable: str, count: int = 1) -> str:
+    """Return the name of one or more patterns of no catalogue, for a list of sets."""
+    noun, over = ('vibration', '') if variable == 'frequency' else (
+        'pattern', f' over {in_words(variable)}')
+    return (f'a {noun}' if count == 1 else f'{count} {noun}s') + over
+
+
 def in_words(variable: str) -> str:
-    """Return what people call a variable, also one of another drive."""
+    """Return the printed name of a variable, also of one of another drive."""
     name, of, other = variable.partition(' of ')
     return name.replace('_', ' ') + of + other
 

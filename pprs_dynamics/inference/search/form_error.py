@@ -38,6 +38,8 @@ from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 # paired recordings with 1 and 4: as many right but for one, and with 1 Coulomb and viscous friction
 # of like size are no longer two effects.
 SHAPES = 4
+PARTS = {'active_friction': "the model's friction of drives",
+         'passive_friction': "the model's friction of passive joints"}  # as they are printed
 Squares = dict[int, float]  # whitened squares of a force by drive
 # The idealised effects with a force on a drive, and their whitened forces there.
 Forces = dict[int, tuple[list[EffectCandidate], Array]]
@@ -96,7 +98,8 @@ class FormErrors:
             size = self._beyond_others(fitted, candidate, covariance)
             if size < least * allowed:
                 least = size / allowed
-                found = (f'{candidate.name} may be the form error of {", ".join(names)}',
+                found = (f'{_in_words(candidate.name)} may be the form error of '
+                         f'{", ".join(map(_in_words, names))}',
                          fitted.without(candidate))
         return found
 
@@ -209,6 +212,13 @@ class FormErrors:
         """Return the whitened squares of a block's force with coefficients c (k,)."""
         return {d: float(self.regression.weights(fitted.fit, d) @ (
             self.regression.products([block], d)[block, block] @ c @ c)) for d in block.rows}
+
+
+def _in_words(name: str) -> str:
+    """Return the printed name of an effect, a pattern or a part of the input model."""
+    pattern, _, variable = name.partition(', ')
+    return f'the pattern over {variable}' if variable and pattern == 'unknown' else (
+        PARTS.get(name, name))
 
 
 def _is_free(effect: EffectCandidate) -> bool:

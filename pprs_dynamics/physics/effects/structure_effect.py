@@ -147,13 +147,13 @@ def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: flo
     on a link that turns about a fixed axis a recording decides the first moment, not the mass.
     """
     return (
-        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'added mass on {link}',
                   max(-(1 - KEPT) * mass, -LARGEST), LARGEST, 0.0 if prefix else None, scale=0.1,
                   expected=(moved, moved) if 0 < moved < inf else None),
         *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
                     -1e2, 1e2, at, scale=0.05, product=Product(
                         Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
-                                  f'mass times its place along {axis} of {link}', -1e3, 1e3, 0.0,
+                                  f'first moment along {axis} of {link}', -1e3, 1e3, 0.0,
                                   scale=0.05), f'{prefix}mass', at))
           for axis, at in zip(AXES, centre, strict=True)),
         *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '

@@ -24,7 +24,7 @@ class BaseTilt(BodyEffect):
     Symptom
     -------
     Errors of all drives that depend on the pose alone. A drive that carries no weight on a
-    level base shows it best, as the slides of a 3-PPRS, whose errors sum to nothing, or the
+    level base shows it best, as the slides of a 3-PPRS, whose errors sum to zero, or the
     upright first joint of an arm.
 
     Causes
@@ -50,7 +50,7 @@ class BaseTilt(BodyEffect):
     # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in
     # the model says how.
     linear = tuple(
-        Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -0.35,
+        Parameter(axis, f'alpha_{axis}', 'rad', f'rotation of gravity about {axis} of base', -0.35,
                   0.35, scale=0.01, expected=(0.1, 0.1))
         for axis in 'xy')
 

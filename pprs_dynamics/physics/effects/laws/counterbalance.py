@@ -50,7 +50,7 @@ class Counterbalance(DriveEffect):
 
     Confirmation
     ------------
-    Read its pressure, or take it off with the arm propped: the error must be gone. Let the
+    Read its pressure, or remove it with the arm supported: the error must be gone. Let the
     joint creep over its range, both ways, with two loads: the curve must not change.
 
     References

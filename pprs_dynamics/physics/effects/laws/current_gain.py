@@ -54,7 +54,7 @@ class CurrentGain(MeasurementEffect):
     name = 'current_gain'
     idealised = False
     nonlinear = True
-    linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
+    linear = (Parameter('temperature', 'kappa', '1/K', 'relative error of the measured effort per '
                         'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,
                         scale=0.02, expected=(0.03, 0.03)),

@@ -42,7 +42,7 @@ class EffortGain(MeasurementEffect):
     nonlinear = True
     # Makers state torque constants within some 10 %, as a limit. A factor of more than 1.5 is
     # another unit or motor, which belongs into the model.
-    linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -1 / 3, 0.5,
+    linear = (Parameter('gain', 'g', '1', 'relative error of the measured effort', -1 / 3, 0.5,
                         scale=0.05, expected=(0.04, 0.04)),)
 
     @classmethod

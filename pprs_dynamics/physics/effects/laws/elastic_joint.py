@@ -34,7 +34,7 @@ class ElasticJoint(MeasurementEffect):
 
     Symptom
     -------
-    Weight and inertia as of a drive that stands aside, the more the more it carries, and
+    Weight and inertia as of a displaced drive, in proportion to its load, and
     shakes after jerks. The difference to an encoder on the link follows the load.
 
     Causes
@@ -57,9 +57,9 @@ class ElasticJoint(MeasurementEffect):
     acts_in = frozenset({PLATFORM, MECHANISM})
     nonlinear = True
     linear = (
-        Parameter('compliance', '1/k', 'm/N', 'by which the motor leads the link per load', -1.0,
+        Parameter('compliance', '1/k', 'm/N', 'lead of the motor over the link per load', -1.0,
                   1.0, scale=1e-6, expected=SOFT, turning=(-10.0, 10.0)),
-        Parameter('loss', 'd/k', 's', 'loss over stiffness: by which wind-up is behind its load',
+        Parameter('loss', 'd/k', 's', 'loss over stiffness: time by which wind-up lags its load',
                   -10.0, 10.0, 0.0, scale=0.01, expected=(0.03, 0.03)))
     is_positive = True
 

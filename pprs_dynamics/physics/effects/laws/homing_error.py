@@ -52,7 +52,7 @@ class HomingError(MeasurementEffect):
     is_of_position = True
     # A homing switch or a mark is good for a millimetre or a degree; a joint that was put together
     # or counted wrongly may be off by any angle.
-    linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
+    linear = (Parameter('zero', 'z', 'm', 'error of the measured positions', -0.1, 0.1,
                         scale=0.001, expected=(0.001, math.radians(1.0)),
                         turning=(-math.pi, math.pi)),)
 

@@ -42,7 +42,7 @@ class LostMotion(MeasurementEffect):
 
     Symptom
     -------
-    Weight and inertia as of a drive that stands aside, to another side where the load changes
+    Weight and inertia as of a displaced drive, displaced to the other side where the load changes
     sign. With play a burst at each reversal, where the encoder moves fast and the drive does
     not, which looks like a delay or like hysteresis.
 

@@ -22,7 +22,7 @@ class PayloadOffset(BodyEffect):
 
     Symptom
     -------
-    Offsets of the lifts that sum to nothing: one carries more and the others less. A height
+    Offsets of the lifts that sum to zero: one carries more and the others less. A height
     d_z shows only when the platform tilts or accelerates sideways.
 
     Causes

@@ -54,8 +54,8 @@ class TimeDelay(MeasurementEffect):
     idealised = False
     shows_at_reversals = True
     linear = ()
-    shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
-                       scale=0.001),)
+    shape = (Parameter('delay', 'd', 's', 'delay of the measured effort; negative: early', -1.0,
+                       1.0, scale=0.001),)
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
