@@ -21,7 +21,8 @@ from benchmarks.real import davinci, ur10e
 from benchmarks.real.recorded_data import need_data
 from benchmarks.real.ur10e import Bench, file, table
 from benchmarks.results import write_results
-from pprs_dynamics.measurement.files.recording import read_recording, write_recording
+from pprs_dynamics.app.api.simulate import simulate
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -29,7 +30,7 @@ FREE, SAME_DAY = 'free_one_b', 'free_50s_14harm'
 # [kg m] about pitch: 105 g at 0.535 m, and at the height of the lower bar's hinges.
 MOMENTS = {'insertion': 0.0562, 'parallel': 0.0152}
 BODIES = ('link_mass', 'payload_mass')
-HIDDEN = ('--effect', 'hysteresis', '--effect', 'force_ripple')
+HIDDEN = ('hysteresis', 'force_ripple')
 # Changes of the simulated arm: name, key, joint, factor of its number.
 CHANGES = (('nothing', '', 0, 1.0), ('Coulomb wrist_2 + 10 %', 'friction.coulomb', 4, 1.1),
            ('Coulomb wrist_2 + 5 %', 'friction.coulomb', 4, 1.05),
@@ -84,14 +85,11 @@ def loaded_arm(bench: Bench) -> list[list[str]]:
             since(bench, 'UR10e_other_path', file(ur10e.LOADED), 'ur_other.yaml', 'ur_other.yaml')]
 
 
-def add_noise(model: DriveModel, clean: Path, noisy: Path, seed: int) -> None:
-    """Write a recording with white noise of half a percent of each joint's largest effort."""
-    if noisy.exists():
-        return
-    quiet = read_recording(clean, model.recorded)
-    size = 0.005 * np.abs(quiet.effort).max(axis=0)
-    effort = quiet.effort + size * np.random.default_rng(seed).normal(size=quiet.effort.shape)
-    write_recording(noisy, replace(quiet, effort=effort))
+def with_noise(clean: Recording, seed: int) -> Recording:
+    """Return a recording with white noise of half a percent of each joint's largest effort."""
+    size = 0.005 * np.abs(clean.effort).max(axis=0)
+    return replace(clean, effort=clean.effort + size * np.random.default_rng(seed).normal(
+        size=clean.effort.shape))
 
 
 def simulated_arm(bench: Bench) -> list[list[str]]:
@@ -107,12 +105,11 @@ def simulated_arm(bench: Bench) -> list[list[str]]:
             values[key] = tuple(numbers)
         write_model(bench.folder / f'{run}.yaml', values)
         # The same hidden effects on each day, as they are of the seed; and other noise.
-        bench.run(f'{run}_clean', 'simulate', '--model', f'{run}.yaml', '--output',
-                  f'{run}_clean.csv', '--seed', '1', '--noise', '0', '--duration', '30',
-                  '--path-seed', '1', *HIDDEN)
-        if not bench.as_far:
-            add_noise(base, bench.folder / f'{run}_clean.csv',
-                      bench.folder / f'{run}.csv', number)
+        recorded = bench.folder / f'{run}.csv'
+        if not (bench.as_far or recorded.exists()):
+            clean = simulate(bench.folder / f'{run}.yaml', HIDDEN, seed=1, noise=0.0, duration=30.0,
+                             path_seed=1).recording
+            write_recording(recorded, with_noise(clean, number))
         if number:
             row = since(bench, run, f'{run}.csv', 'sim_0.yaml', 'sim_0.yaml', 'sim_0.csv')
             rows.append([f'simulated, {name}', *row[1:]])

@@ -324,7 +324,8 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     assert main(['init', 'arm.urdf']) == 2
     assert 'exists already' in capsys.readouterr().err
     assert (tmp_path / 'robot.yaml').read_text() == before
-    assert main(['init', 'arm.urdf', '--overwrite']) == 0
+    (tmp_path / 'robot.yaml').unlink()
+    assert main(['init', 'arm.urdf']) == 0
     assert 'pprs info RECORDING' in ' '.join(capsys.readouterr().out.split())
     assert main(['init', 'arm.urdf', 'none.csv', '--output', 'y.yaml']) == 2
     assert not (tmp_path / 'y.yaml').exists()

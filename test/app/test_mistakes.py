@@ -58,7 +58,7 @@ MISTAKES = {
     'reproduce': '--output',
     'reproduce --output /dev/null/below': '/dev/null/below: Not a directory',
     'reproduce --output x --model axis.yaml': 'must be a 3-PPRS',
-    'simulate --output x.csv --noise -1': 'argument --noise: ',
+    'simulate --output x.csv --duration -1': 'argument --duration: ',
     'simulate --output x.csv --seed 1.5': "'1.5' must be a whole number",
     'survey run.csv --output x --effects no_such_effect': 'no_such_effect',
     'trend nowhere': 'nowhere',

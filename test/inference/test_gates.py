@@ -11,6 +11,7 @@ import scipy.signal
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.adoption.adopt import _Case
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import (
     COURSE_TIMES,
@@ -26,6 +27,8 @@ from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, pred
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 
 
 def gain(*in_errors: float) -> PredictiveGain:
@@ -65,6 +68,18 @@ def test_newtons_and_newton_metres_are_not_added() -> None:
     assert found.by_drive['drive_1'] > 100
     assert found.confirms(2.0)
     assert not predictive_gain(residuals_of(after), residuals_of(error)).confirms(2.0)
+
+
+def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() -> None:
+    """The error that is printed decides; the gain says whether its fall is more than chance."""
+    case = _Case(DriveModel.load(find_file(DEFAULT_MODEL)), (), (), None, None)  # type: ignore[arg-type]
+    sure, unsure = gain(9.0), gain(0.5)
+    for after in (1.0, 1.2, np.nan):
+        said, = case.objections(sure, (1.0, after), 'the recordings', 'N')
+        assert 'does not fall' in said
+    assert case.objections(sure, (1.0, 0.9), 'the recordings', 'N') == ()
+    said, = case.objections(unsure, (1.0, 0.9), 'the recordings', 'N')
+    assert 'falls from 1 N to 0.9 N; the fall is 0.5 standard errors' in said
 
 
 @pytest.mark.parametrize('slow', [False, True])

@@ -36,7 +36,7 @@ from pprs_dynamics.inference.readings.table import (
     WORDS,
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
-from pprs_dynamics.measurement.files.bag_storage import is_storage
+from pprs_dynamics.measurement.files.bag_storage import is_bag_folder, is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
@@ -377,8 +377,8 @@ def _actuated(path: Path) -> set[str]:
 def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
     """Return recordings, and the files by quantity where they are one recording."""
     folder = recordings[0] if len(recordings) == 1 else None
-    if folder is not None and folder.is_dir() and not is_lerobot(folder) and not (
-            folder / 'metadata.yaml').is_file():
+    if folder is not None and folder.is_dir() and not (
+            is_lerobot(folder) or is_bag_folder(folder)):
         inside = sorted(file for file in folder.iterdir() if file.is_file())
         if not any(is_storage(file) for file in inside):
             files = _by_quantity(inside)

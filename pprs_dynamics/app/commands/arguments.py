@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 
 JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)
-FILES_OF_RECORDINGS = ('.csv', '.mcap', '.db3')
-RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
@@ -143,6 +141,22 @@ def add_shared(parser: argparse.ArgumentParser, *names: str, required: bool = Tr
             option.required = required and name == 'output'
 
 
+def require_output(options: argparse.Namespace, switch: str) -> None:
+    """Refuse --output without the switch that writes it, and the switch without --output.
+
+    Raises
+    ------
+    UsageError
+    """
+    is_given = getattr(options, switch.replace('-', '_'))
+    if is_given and not options.output:
+        raise UsageError(f'--{switch}: no --output FILE is given, must say where the new model '
+                         'file goes')
+    if options.output and not is_given:
+        raise UsageError(f'--output: it is given without --{switch}, which alone writes a model '
+                         'file; --json and --report write the answer')
+
+
 def output_folder(text: str) -> str:
     """Read the name of a folder to write to, which may exist; not its address elsewhere."""
     path = Path(text)
@@ -159,6 +173,7 @@ def check_files(options: argparse.Namespace) -> None:
     UnreadableFileError
     """
     # Here, as --help needs no model.
+    from pprs_dynamics.measurement.files.recording import ENDINGS
     from pprs_dynamics.physics.model.parameter_file import find_file
 
     seen: dict[str, str] = {}
@@ -170,7 +185,7 @@ def check_files(options: argparse.Namespace) -> None:
             if option in OUTPUTS and real in seen:
                 raise UnreadableFileError(
                     name, f'it is --{option} and {seen[real]} at once, must be another file')
-            if option in OUTPUTS and path.suffix in FILES_OF_RECORDINGS and os.path.lexists(path):
+            if option in OUTPUTS and path.suffix in ENDINGS and os.path.lexists(path):
                 raise UnreadableFileError(name, 'it exists already, must be another name for '
                                           f'--{option}: recordings are never replaced')
             seen[real] = NAMED.get(option, f'--{option}')

@@ -10,8 +10,13 @@ from typing import Any
 
 from pprs_dynamics.app.api.adopt import adopt_all
 from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
-from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.arguments import read_inputs, tell, write_json
+from pprs_dynamics.app.commands.arguments import (
+    add_shared,
+    read_inputs,
+    require_output,
+    tell,
+    write_json,
+)
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.system.plain_text import counted
 
@@ -20,19 +25,16 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference',
-                         'report')
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference', 'report')
     parser.add_argument('--details', action='store_true',
                         help='print all findings, tables and values')
-    parser.add_argument('--adopt-all', action='store_true',
-                        help='add the reported effects')
-    arguments.add_shared(parser, 'output', required=False,
-                         output='model file that --adopt-all writes')
+    parser.add_argument('--adopt-all', action='store_true', help='add the reported effects')
+    add_shared(parser, 'output', required=False, output='model file that --adopt-all writes')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    _check(options)
+    require_output(options, 'adopt-all')
     screen = console()
     inputs = read_inputs(options, screen)
     with staged_bar(screen) as progress:
@@ -60,12 +62,3 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
         result.save(options.output)
         screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
-
-
-def _check(options: argparse.Namespace) -> None:
-    if options.adopt_all and not options.output:
-        raise arguments.UsageError('--adopt-all: no --output FILE is given, must say where the '
-                                   'new model file goes')
-    if options.output and not options.adopt_all:
-        raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
-                                   'written to it then; --json and --report write the answer')

@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
+from pprs_dynamics.app.commands.arguments import add_shared, require_output, write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -30,11 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    if options.undo and not options.output:
-        raise UsageError('--undo: no --output FILE is given, must say where the new model file '
-                         'goes')
-    if options.output and not options.undo:
-        raise UsageError('--output: it is given without --undo, which alone writes a model file')
+    require_output(options, 'undo')
     screen = console()
     # Here, as --help draws nothing.
     from pprs_dynamics.app.report.history_report import history_page, history_view

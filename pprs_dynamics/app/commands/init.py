@@ -11,10 +11,8 @@ from dataclasses import asdict
 from shlex import quote
 
 from pprs_dynamics.app.api.first_model import first_model
-from pprs_dynamics.app.api.simulate import recording_rows
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
 from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
-from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -36,16 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
-    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
-                        help='picture of positions and efforts as they are read')
-    parser.add_argument('--overwrite', action='store_true', help='replace an existing model file')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    if os.path.lexists(options.output) and not options.overwrite:
-        raise UsageError(f'{displayed(options.output)}: it exists already, must be another name '
-                         'for --output, or be given with --overwrite')
+    if os.path.lexists(options.output):
+        raise UsageError(f'{displayed(options.output)}: it exists already, and may have been '
+                         'edited: delete it, or give another name for --output')
     screen = console()
     drives = [name for name in options.drives.split(',') if name]
     first = first_model(options.robot, options.recordings, options.output,
@@ -61,11 +56,7 @@ def run(options: argparse.Namespace) -> int:
         for line in first.questions:
             screen.print(f'  {shown(line)}')
         return 1
-    recordings, summaries = show_recordings(model, list(map(str, first.recordings)), None,
-                                            screen)
-    if options.picture and recordings:
-        save(plot_over_time(recordings[0].time, recording_rows(
-            recordings[0], model.units)), options.picture)
+    _, summaries = show_recordings(model, list(map(str, first.recordings)), None, screen)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     file = quote(options.output)

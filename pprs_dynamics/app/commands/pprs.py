@@ -35,7 +35,9 @@ COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 # Commands without --model (they name a model file or a store) and without --json.
 WITHOUT_MODEL, WITHOUT_JSON = ('export', 'history', 'init', 'trend'), ('workbench',)
-NO_MODEL = ('No --model is given: the model is that of the paper\'s robot (--demo).\n'
+# Without --demo, which would do nothing: about the paper's robot anyway, or about a fleet.
+WITHOUT_DEMO = ('reproduce', 'survey')
+NO_MODEL = ('No --model is given: the model is that of the paper\'s robot, as with --demo.\n'
             '`pprs init ROBOT.urdf RECORDING` writes the model of your robot.')
 EXAMPLES = """\
 examples:
@@ -124,7 +126,7 @@ def _choose_model(options: argparse.Namespace) -> bool:
     if options.command in WITHOUT_MODEL or options.model is not None:
         return False
     options.model = DEFAULT_MODEL
-    return not options.demo and bool(getattr(options, 'recordings', False))
+    return not getattr(options, 'demo', False) and bool(getattr(options, 'recordings', False))
 
 
 def _say(sentence: str, given: Sequence[str]) -> None:
@@ -193,8 +195,9 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
             model = command.add_mutually_exclusive_group()
             model.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
                                'init writes one')
-            model.add_argument('--demo', action='store_true', help='use the model of the '
-                               f'paper\'s robot, {DEFAULT_MODEL}')
+            if name not in WITHOUT_DEMO:
+                model.add_argument('--demo', action='store_true', help='use the model of the '
+                                   f'paper\'s robot, {DEFAULT_MODEL}')
         if name not in WITHOUT_JSON:
             command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
                                  help='also write the result as JSON')

@@ -13,8 +13,9 @@ import argparse
 import numpy as np
 
 from pprs_dynamics.app.api.simulate import RATE, simulate
-from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file, seed, tell
+from pprs_dynamics.app.commands.arguments import number, output_file, seed, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -29,7 +30,7 @@ EXAMPLE = 'pprs simulate --demo --output run.mcap --effect stribeck_friction --s
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
+    parser.add_argument('--output', metavar='RECORDING', type=output_file(*ENDINGS, ''),
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='EFFECT', action='append', default=[],
@@ -45,9 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='length of an excitation [s] (default 40)')
     parser.add_argument('--path-seed', metavar='N', type=seed, default=0,
                         help='seed of an excitation (default 0)')
-    parser.add_argument('--noise', metavar='STD', type=number(0.0, 1e3, 'N'),
-                        help='standard deviation of the efforts [N or N m] (default: 0.5 %% of the '
-                        'largest)')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     with staged_bar(screen) as progress:
         result = simulate(
             model, options.effect, seed=options.seed, motion=motion, duration=options.duration,
-            path_seed=options.path_seed, noise=options.noise, progress=progress)
+            path_seed=options.path_seed, progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}', soft_wrap=True)

@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.bag_storage import is_bag_folder
+from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.system.files import new_file
 
 AUTO = 'auto'  # effects of a survey that diagnoses
@@ -31,9 +33,6 @@ COLUMNS = {
     'effect': TEXT, 'parameter': TEXT, 'value': NUMBER, 'std': NUMBER, 'unit': TEXT,
     'evidence': NUMBER, 'rms': NUMBER, 'relative': NUMBER, 'noise': NUMBER, 'verdict': TEXT,
     'error': TEXT}
-
-ENDINGS = ('.csv', '.mcap', '.db3')
-BAG = 'metadata.yaml'  # in the folder of a rosbag2 recording
 
 
 def write_rows(store: Path, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -121,7 +120,7 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[SurveyedRecording]:
 
 def recordings_in(place: Path) -> Iterator[Path]:
     """Yield the bags and files of recordings in a folder, hidden ones left out; or a file."""
-    if not place.is_dir() or (place / BAG).exists():
+    if not place.is_dir() or is_bag_folder(place):
         yield place
         return
     for path in sorted(place.iterdir()):

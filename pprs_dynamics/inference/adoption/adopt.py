@@ -3,8 +3,8 @@
 
 """Adding an effect to a model: its row of the table, the held-out test, and the decision.
 
-The values are those of the diagnosis: of the best row that has the effect. What decides is whether
-the new model predicts better, drive by drive in units of the noise.
+The values are those of the diagnosis: of the best row that has the effect. The error that is
+printed decides: it must fall, on the recordings and on held-out data, by more than its uncertainty.
 """
 
 from __future__ import annotations
@@ -175,11 +175,15 @@ class _Case:
             isinstance(effect, CatalogueEffect) for effect in self.model.effects) else FIRST_ERRORS
         if gain is None:
             return (f'the error on {where} cannot be computed',)
+        before, after = errors
+        said = f'the error on {where} {change(before, after, unit)}'
+        if not after < before:
+            return (said,)
         if gain.confirms(asked):
             return ()
         why = (f'on {listed(gain.losing)} it rises for certain' if gain.losing else
                f'the fall is {gain.certainty:.2g} standard errors, must be more than {asked:g}')
-        return (f'the error on {where} {change(errors[0], errors[1], unit)}; {why}',)
+        return (f'{said}; {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
                  residuals: Sequence[Residuals], held_out: Sequence[float],

@@ -100,7 +100,7 @@ def percent(share: float) -> str:
 
 def change(before: float, after: float, unit: str = 'N') -> str:
     """Return 'falls from A to B', with digits that show it, or that it does not fall."""
-    if after >= before:
+    if not after < before:  # nor where one is not a number
         return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
                 'after)')
     first, second = both_in_unit(before, after, unit)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 # First bytes of a bare storage file, and the suffix by which rosbags knows it.
 MAGIC = {b'\x89MCAP': '.mcap', b'SQLite format 3\x00': '.db3', b'#ROSBAG V': '.bag'}
 SUFFIXES = ('.mcap', '.db3', '.bag')
+METADATA = 'metadata.yaml'  # in the folder of a rosbag2 recording
 
 
 def storage_suffix(path: Path) -> str | None:
@@ -43,6 +44,11 @@ def storage_suffix(path: Path) -> str | None:
 def is_storage(path: Path) -> bool:
     """Return whether a file is a bag, or promises to be one; a folder always does."""
     return (path.is_dir() or _promises(path) or storage_suffix(path) is not None)
+
+
+def is_bag_folder(path: Path) -> bool:
+    """Return whether a folder is one recording of rosbag2, and not a folder of recordings."""
+    return (path / METADATA).is_file()
 
 
 def _promises(path: Path) -> bool:
@@ -174,17 +180,17 @@ def _storages_of(path: Path) -> tuple[list[Path], list[Defect]]:
             raise UnreadableFileError(
                 path, f'its content is a {suffix} file of a bag: its name must end so')
         return [path], []
-    if (path / 'metadata.yaml').is_file():
+    if is_bag_folder(path):
         return [path], []
     found = sorted(file for file in path.iterdir() if file.is_file() and _promises(file))
     kinds = {'.bag' in file.suffixes for file in found}
     if not found:
-        raise UnreadableFileError(path, 'not a rosbag2 directory: there is no metadata.yaml')
+        raise UnreadableFileError(path, f'not a rosbag2 directory: there is no {METADATA}')
     if len(kinds) > 1:
         raise UnreadableFileError(path, 'it holds files of ROS 1 and ROS 2: name one of them')
     if kinds == {True}:
         return found, []  # ROS 1 has no metadata
-    return found, [Defect('no_metadata', len(found), 'the bag has no metadata.yaml')]
+    return found, [Defect('no_metadata', len(found), f'the bag has no {METADATA}')]
 
 
 def _unpacked(path: Path, folder: Path) -> Path:

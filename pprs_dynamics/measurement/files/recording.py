@@ -27,6 +27,8 @@ from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, S
 from pprs_dynamics.measurement.files.table_files import read_table
 from pprs_dynamics.system.plain_text import counted, displayed
 
+# Of files that are written, and looked for in folders.
+ENDINGS = ('.csv', '.mcap', '.db3')
 # Share of a turn that a step has at least where an angle begins again.
 MOST_OF_TURN, TURN_ROUNDING = 0.75, 1e-3
 

@@ -20,10 +20,12 @@ from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING
 
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.fleet.recordings import BAG, ENDINGS, recordings_in
+from pprs_dynamics.app.fleet.recordings import recordings_in
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.ticks import SessionError
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.bag_storage import is_bag_folder
+from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -71,8 +73,7 @@ class Offered:
 def is_folder(path: str) -> bool:
     """Return whether a path is a folder that holds recordings, and none itself."""
     # An empty name would be the present folder, which nobody named.
-    return bool(path) and Path(path).is_dir() and not (
-        (Path(path) / BAG).exists() or any(Path(path).glob('*.db3')))
+    return bool(path) and Path(path).is_dir() and not is_bag_folder(Path(path))
 
 
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
