@@ -289,7 +289,7 @@ def diagnosis_page(
     _add_tables(page, _alternatives(diagnosis))
     page.folded_list(*suspects)
     page.folded_list(*barred)
-    page.heading('Not seen, and from which size it would have been')
+    page.heading('Detection limits and method')
     _add_tables(page, _unseen(diagnosis))
     with page.fold('Method'):
         page.text(' '.join(METHOD))

@@ -86,7 +86,7 @@ export class Curves {
               values: is_last ? (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`)
                 : (u, ticks) => ticks.map(() => '')},
              {...axis, size: 62, values: (u, ticks) => ticks.map(
-               (t) => `${+t.toPrecision(3)} ${this.unitOf(drive)}`), space: 22}],
+               (t) => `${+t.toPrecision(3)} ${this.unitOf(drive)}`), space: 15}],
       series: [{},
                {stroke: css('--before'), width: 1, points: {show: false}},
                {stroke: css('--now'), width: 1, points: {show: false}}],

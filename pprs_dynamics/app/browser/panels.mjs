@@ -113,16 +113,16 @@ export const showRecordings = (state, see, remove) => {
     item.append(place);
     if (state.recordings.length > 1) item.append(without(one));
     return item;
-  }));
-  $('held-out-list').replaceChildren(...state.held_out.map((one) => {
-    const item = make('li', `judged on: ${one.name} `);
-    item.append(without(one));
+  }), ...state.held_out.map((one) => {
+    const item = make('li'), place = make('div', '', 'held-out');
+    place.append(make('b', one.name), make('div', 'held out', 'quiet'));
+    item.append(place, without(one));
     return item;
   }));
   $('held-out').textContent = state.held_out.length
-    ? `Adoptions are judged on ${state.held_out.map((one) => one.name).join(', ')}.`
-    : 'Adoptions are judged on blocks of the same recordings: weak evidence. Add one of another '
-      + 'motion to judge them on.';
+    ? `Adoptions are checked on ${state.held_out.map((one) => one.name).join(', ')}.`
+    : 'Adoptions are checked on blocks of the same recordings, which is weak evidence. Add a '
+      + 'recording of another motion as held out.';
   const findings = state.recordings.flatMap((one) => one.findings.map(
     (text) => make('li', `${one.name}: ${text}`)));
   $('findings').replaceChildren(...(findings.length ? findings : [make('li', 'none', 'quiet')]));
@@ -150,7 +150,7 @@ export const showFiles = async (server) => {
   const {files} = await server.ask('files');
   $('files').replaceChildren(...files.map((name) => {
     const item = make('li', '', 'bar');
-    const judge = button('Judge on it', () => server.run('open', {name, is_held_out: true}));
+    const judge = button('Hold out', () => server.run('open', {name, is_held_out: true}));
     judge.disabled = Boolean(server.state.is_empty);
     item.append(make('span', name.slice(name.indexOf('/') + 1)), button('Open', () => server.run('open', {name})), judge);
     return item;

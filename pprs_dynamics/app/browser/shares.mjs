@@ -1,4 +1,4 @@
-/* Where a marked error is from: the shares of effects that are not ticked. */
+/* What explains a marked error: the shares of effects that are not ticked. */
 
 import {$, button, css, make} from './dom.mjs';
 import {amount, titleOf} from './format.mjs';
@@ -24,13 +24,14 @@ export const placeOf = (asked) => (asked.time
 export const showShares = (asked, found, tick, see, unit = '') => {
   $('spans').replaceChildren();
   if (!asked) {
-    $('shares-of').textContent = 'Drag over a curve or a scatter.';
+    $('shares-of').textContent = 'Drag over a curve or a scatter plot: each effect is listed with '
+      + 'the share of the error there that it explains.';
     $('share-list').replaceChildren();
     return;
   }
   $('shares-of').textContent = `${found.samples} samples in ${placeOf(asked)}: error ${
-    amount(found.before)} → ${amount(found.now)} ${unit}. Of the squared error now, less the prior cost
- of each effect:`;
+    amount(found.before)} → ${amount(found.now)} ${unit}. Share of the squared error now, less the
+ penalty of each effect:`;
   const told = found.shares.filter((one) => one.net > LEAST).slice(0, MOST).map((one) => {
     const item = make('li');
     const place = button('', (event) => tick(one.effect, event.timeStamp));
@@ -41,7 +42,7 @@ export const showShares = (asked, found, tick, see, unit = '') => {
     return item;
   });
   $('share-list').replaceChildren(...(told.length ? told
-    : [make('li', 'No effect explains it and pays its prior cost.')]));
+    : [make('li', 'No effect explains it beyond its penalty.')]));
   if (!asked.time && found.spans.length) {
     $('spans').append(button(`Show when: ${found.spans.length} span${
       found.spans.length > 1 ? 's' : ''}, the longest at ${found.spans[0][0].toFixed(2)} s`,

@@ -49,9 +49,9 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
     figure = effort_over_error(
         before, drive, time,
         (('measured', measured, charts.MEASURED), ('input model', given, charts.ERROR),
-         ('model with the reported effects', found, AFTER)),
+         ('model with the effects', found, AFTER)),
         (('error of the input model', measured - given, charts.ERROR),
-         ('error with the reported effects', measured - found, AFTER)))
+         ('error with the effects', measured - found, AFTER)))
     for level in (-2 * floor, 2 * floor):
         figure.add_hline(y=level, row=2, col=1, line={'color': FLOOR, 'width': 1, 'dash': 'dot'})
     return figure
@@ -307,8 +307,9 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
                            xaxis_title=label,
                            yaxis_title=f'mean {what} on {statement.drive} [{units.effort}]')
     if statement.range is not None and statement.variable == variable:
-        low, high = (factor * end for end in statement.range)
-        figure.add_vrect(x0=low, x1=high, fillcolor=charts.MARK, opacity=0.15, line_width=0)
+        for sign in (1, -1) if statement.is_of_speed else (1,):
+            low, high = sorted(sign * factor * end for end in statement.range)
+            figure.add_vrect(x0=low, x1=high, fillcolor=charts.MARK, opacity=0.15, line_width=0)
     figure.add_hline(y=0, line={'color': charts.MEASURED, 'width': 0.8})
     return figure
 

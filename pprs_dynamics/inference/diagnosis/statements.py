@@ -99,6 +99,11 @@ class Statement:
     kind: str
     mean_square: float
 
+    @property
+    def is_of_speed(self) -> bool:
+        """Whether `range` is one of the speed, in either direction."""
+        return is_of_speed(self.kind, self.variable)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'drive': self.drive, 'variable': self.variable,
@@ -190,6 +195,11 @@ def _sentence(
     return f'{place} its error is shifted by {with_sign(signed, SHOWN)} {effort}{along} ({of})'
 
 
+def is_of_speed(kind: str, variable: str) -> bool:
+    """Return whether a kind of pattern over a variable depends on the speed alone."""
+    return kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
+
+
 def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> str:
     assert pattern.limits is not None
     low, high = pattern.limits
@@ -199,7 +209,7 @@ def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> st
     factor, unit = read_in(variable, drive_patterns.residuals.units_of(of))
     word = in_words(variable)
     values = drive_patterns.values(variable)
-    speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
+    speed = is_of_speed(pattern.kind, variable)
     if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
         word = word.replace('velocity', 'speed')
         values, low = np.abs(values), max(low, 0.0)
