@@ -11,8 +11,8 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.adopt import adopt
-from pprs_dynamics.app.commands.arguments import add_shared, read_inputs, tell
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.commands.arguments import add_shared, answer, tell
+from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -36,13 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    screen = console()
     # What does not exist is said before recordings are read.
     requested(options.effect, DriveModel.load(find_file(options.model)))
-    inputs = read_inputs(options, screen)
-    with staged_bar(screen) as progress:
-        result = adopt(inputs.model, options.effect, inputs, force=options.force,
-                       progress=progress, reference=options.reference)
+    screen, result = answer(adopt, options, effect=options.effect, force=options.force,
+                            reference=options.reference)
     if result.adopted:
         result.save(options.output)
     tell(result, options, screen, lambda: result.page(options.output))

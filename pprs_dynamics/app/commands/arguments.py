@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from pprs_dynamics.app.report.terminal import shown, staged_bar
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.files import writable_file, write_text
 from pprs_dynamics.system.numbers import parse_number, parse_whole
@@ -212,6 +212,21 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
         for finding in (each for each in recording.findings if each.kind != 'missing_velocity'):
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
     return inputs
+
+
+def answer(call: Callable[..., Any], options: argparse.Namespace, whole: bool = False,
+           **settings: Any) -> tuple[Any, Any]:
+    """Return the console, and the result of a call for the model and recordings of the arguments.
+
+    Raises
+    ------
+    PprsError
+        As `read_inputs` and the call.
+    """
+    screen = console()
+    inputs = read_inputs(options, screen, whole)
+    with staged_bar(screen) as progress:
+        return screen, call(inputs.model, recordings=inputs, progress=progress, **settings)
 
 
 def write_json(path: str | PathLike[str], content: Any) -> None:

@@ -8,17 +8,16 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.compare import compare
-from pprs_dynamics.app.commands import arguments
-from pprs_dynamics.app.commands.arguments import read_inputs, tell
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.commands.arguments import add_shared, answer, output_file, tell
+from pprs_dynamics.app.report.terminal import shown, staged_bar
 
 EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    arguments.add_shared(parser, 'recordings', 'topic', 'as-it-is', 'report')
-    parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
+    add_shared(parser, 'recordings', 'topic', 'as-it-is', 'report')
+    parser.add_argument('--mcap', metavar='FILE.mcap', type=output_file('.mcap'),
                         help='bag to write: measured effort, effort of the model, its parts and '
                         'the residual, as sensor_msgs/JointState')
     parser.add_argument('--beside', metavar='FILE.yaml', help='another model file; its '
@@ -27,11 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    screen = console()
-    inputs = read_inputs(options, screen, whole=True)
-    with staged_bar(screen) as progress:
-        result = compare(inputs.model, inputs, topic=options.topic, beside=options.beside,
-                         progress=progress)
+    screen, result = answer(compare, options, whole=True, topic=options.topic,
+                            beside=options.beside)
     tell(result, options, screen)
     if options.mcap:
         with staged_bar(screen) as progress:

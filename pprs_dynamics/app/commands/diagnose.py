@@ -12,12 +12,12 @@ from pprs_dynamics.app.api.adopt import adopt_all
 from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.commands.arguments import (
     add_shared,
-    read_inputs,
+    answer,
     require_output,
     tell,
     write_json,
 )
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.report.terminal import shown, staged_bar
 from pprs_dynamics.system.plain_text import counted
 
 EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --report why.html'
@@ -35,10 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     require_output(options, 'adopt-all')
-    screen = console()
-    inputs = read_inputs(options, screen)
-    with staged_bar(screen) as progress:
-        result = diagnose(inputs.model, inputs, progress=progress, reference=options.reference)
+    screen, result = answer(diagnose, options, reference=options.reference)
     tell(result, options, screen,
          view=result.view(options.details, next_step=not options.adopt_all))
     return _adopt_all(result, options, screen) if options.adopt_all else 0

@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.fit import fit
-from pprs_dynamics.app.commands.arguments import add_shared, read_inputs, tell
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.commands.arguments import add_shared, answer, tell
+from pprs_dynamics.app.report.terminal import shown
 
 EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
 
@@ -21,10 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    screen = console()
-    inputs = read_inputs(options, screen)
-    with staged_bar(screen) as progress:
-        result = fit(inputs.model, inputs, progress=progress)
+    screen, result = answer(fit, options)
     result.save(options.output)
     tell(result, options, screen)
     screen.print(f'model: {shown(options.output)}', soft_wrap=True)

@@ -9,15 +9,8 @@ import argparse
 import shlex
 
 from pprs_dynamics.app.api.next_experiment import RATE, next_experiment
-from pprs_dynamics.app.commands.arguments import (
-    POSES,
-    add_shared,
-    output_file,
-    read_inputs,
-    seed,
-    tell,
-)
-from pprs_dynamics.app.report.terminal import console, shell_command, shown, staged_bar
+from pprs_dynamics.app.commands.arguments import POSES, add_shared, answer, output_file, seed, tell
+from pprs_dynamics.app.report.terminal import shell_command, shown
 from pprs_dynamics.inference.experiments.next_experiment import PURPOSES, check_purpose
 from pprs_dynamics.system.plain_text import displayed
 
@@ -40,15 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    screen = console()
     check_purpose(options.purpose, options.recordings)
-    inputs = read_inputs(options, screen)
-    with staged_bar(screen) as progress:
-        result = next_experiment(inputs.model, inputs, purpose=options.purpose,
-                                 seed=options.seed, progress=progress)
+    screen, result = answer(next_experiment, options, purpose=options.purpose, seed=options.seed)
     tell(result, options, screen, output=options.output)
     result.save(options.output)
-    if inputs.model.moves_joints:
+    if result.inputs.model.moves_joints:
         screen.print('[bold]Play it[/] with a controller of joint trajectories: positions, '
                      f'velocities and accelerations are in {shown(options.output)}')
     else:

@@ -75,42 +75,39 @@ class Fields(dict[str, Any]):
 
     def text(self, key: str) -> str:
         """Return a text."""
-        value = self.get(key)
-        if not isinstance(value, str):
-            raise BadRequestError(f'{key} must be a text')
-        return value
+        return str(self._checked(key, lambda value: isinstance(value, str), 'a text'))
 
     def number(self, key: str) -> float:
         """Return a number."""
-        return float(_is_number(self.get(key), f'{key} must be a number'))
+        return float(self._checked(key, _is_number, 'a number'))
 
     def range(self, key: str) -> tuple[float, float]:
         """Return two numbers."""
-        value, rule = self.get(key), f'{key} must be two numbers'
-        if not isinstance(value, list) or len(value) != 2:
-            raise BadRequestError(rule)
-        return float(_is_number(value[0], rule)), float(_is_number(value[1], rule))
+        first, last = self._checked(key, lambda value: isinstance(value, list) and len(
+            value) == 2 and all(map(_is_number, value)), 'two numbers')
+        return float(first), float(last)
 
     def revision(self) -> int:
         """Return the revision that a change counts on."""
-        value = _is_number(self.get('revision'), 'revision must be a whole number')
-        if value != int(value):
-            raise BadRequestError('revision must be a whole number')
-        return int(value)
+        return int(self._checked('revision', lambda value: _is_number(value) and value == int(
+            value), 'a whole number'))
 
     def drives(self) -> list[str] | None:
         """Return names of drives, None where none are given."""
-        value = self.get('drives')
-        if value is not None and not (isinstance(value, list) and value and all(
-                isinstance(name, str) for name in value)):
-            raise BadRequestError('drives must be a list of names')
+        names: list[str] | None = self._checked('drives', lambda value: value is None or (
+            isinstance(value, list) and value and all(isinstance(name, str) for name in value)),
+            'a list of names')
+        return names
+
+    def _checked(self, key: str, is_right: Callable[[Any], object], rule: str) -> Any:
+        if not is_right(value := self.get(key)):
+            raise BadRequestError(f'{key} must be {rule}')
         return value
 
 
-def _is_number(value: Any, rule: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > LARGEST:
-        raise BadRequestError(rule)
-    return value
+def _is_number(value: Any) -> bool:
+    return (isinstance(value, (int, float)) and not isinstance(value, bool)
+            and abs(value) <= LARGEST)
 
 
 def packed(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> bytes:
