@@ -44,6 +44,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.keys import EFFORT_UNITS
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
@@ -177,7 +178,8 @@ class _Case:
             return (f'the error on {where} cannot be computed',)
         before, after = errors
         said = f'the error on {where} {change(before, after, unit)}'
-        if not after < before:
+        # Newtons and newton metres have no sum: there each drive is judged by itself.
+        if not after < before and unit in EFFORT_UNITS:
             return (said,)
         if gain.confirms(asked):
             return ()
