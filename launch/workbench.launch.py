@@ -18,7 +18,7 @@ def generate_launch_description() -> LaunchDescription:
     """Return the process and its arguments."""
     arguments = {
         'model': (None, 'model file of the robot that is connected, with a path'),
-        'namespace': ('/', 'of the topic, monitor and feedforward'),
+        'namespace': ('', 'of the topic, monitor and feedforward'),
         'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
                    'the model file'),
         'joint_states': ('joint_states', 'topic of the measurements'),
@@ -37,7 +37,7 @@ def generate_launch_description() -> LaunchDescription:
         return [ExecuteProcess(cmd=[
             pprs, 'workbench', '--live', '--no-browser', '--model', model,
             '--live-topic', given['joint_states'], '--port', given['port'],
-            '--ros-args', '-r', ['__ns:=', given['namespace']],
+            '--ros-args', '-r', f'__ns:=/{given["namespace"].perform(context).strip("/")}',
             '-p', ['use_sim_time:=', given['use_sim_time']],
             *(('-p', ['joint_prefix:=', given['prefix']])
               if given['prefix'].perform(context) else ()),

@@ -201,12 +201,16 @@ class FeedforwardNode(ManagedNode):
         if self._current is not None:
             self._current.publish(efforts(self._settings.model.currents(effort)))
 
-    def _publish_rest(self, answer: ForceCommand) -> None:
-        request, forces = answer.request, answer.forces
+    def _send_setpoint(self, command: ForceCommand, stamp: int) -> None:
+        """Send positions, velocities and efforts of a time [ns] as one setpoint."""
         if self._joint_command.get_subscription_count():
-            position, velocity, _ = forces.drive_motion
+            position, velocity, _ = command.forces.drive_motion
             self._joint_command.publish(joint_state(
-                request.first_stamp, answer.effort[0], position[0], velocity[0], self._names))
+                stamp, command.effort[0], position[0], velocity[0], self._names))
+
+    def _publish_rest(self, answer: ForceCommand) -> None:
+        request = answer.request
+        self._send_setpoint(answer, request.first_stamp)
         self._sent = None
         if self._joint_trajectory.get_subscription_count():
             drives = self._sent = self._feedforward.ending_at_rest(
@@ -342,11 +346,7 @@ class FeedforwardNode(ManagedNode):
         try:
             held = self._feedforward.hold(gravity, left)
             self._command(held)
-            if self._joint_command.get_subscription_count():
-                self._joint_command.publish(joint_state(
-                    self.get_clock().now().nanoseconds, held.effort[0],
-                    held.forces.mechanism.position[0], held.forces.mechanism.velocity[0],
-                    self._names))
+            self._send_setpoint(held, self.get_clock().now().nanoseconds)
             controller = self._end_trajectory(held, left, gravity)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'

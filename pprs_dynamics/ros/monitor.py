@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from dataclasses import replace
 from threading import Thread
 from typing import Any
 
@@ -34,13 +33,43 @@ from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
-from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
+from pprs_dynamics.ros.node.parameters import node_parameter, overrides, with_changed
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.simulation.export.exported_robot import TreePose, TreePositions
 from pprs_dynamics.system.plain_text import for_json
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # it comes with a ROS 2 installation only
+    TFMessage = None
+
+PARAMETERS = (
+    AUTOSTART,
+    FRAME,
+    node_parameter('tf_prefix', '', 'of all frames on /tf: two robots need one each', stays=True),
+    node_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
+                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
+    node_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
+                   upper=600.0, stays=True),
+    node_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+                   lower=1.0, upper=1000.0, stays=True),
+    node_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
+                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
+    node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
+                   upper=3600.0, stays=True),
+    node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
+                   'windows are diagnosed for changes since then', stays=True),
+    node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
+                   'absolute or in the namespace of this one', stays=True),
+)
+
+# Of the samples of a second: from fewer compared ones on the stream is called broken.
+FEW = 0.5
+ENOUGH = 20  # samples in a second, whose share says anything
+LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 
 class AllJoints:
@@ -86,37 +115,6 @@ def _make(model: DriveModel, position: Array, made: list[TreePositions | PprsErr
         made.append(error)
 
 
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:  # it comes with a ROS 2 installation only
-    TFMessage = None
-
-PARAMETERS = (
-    AUTOSTART,
-    FRAME,
-    node_parameter('tf_prefix', '', 'of all frames on /tf: two robots need one each', stays=True),
-    node_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
-                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
-    node_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
-                   upper=600.0, stays=True),
-    node_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
-                   lower=1.0, upper=1000.0, stays=True),
-    node_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
-                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
-    node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
-                   upper=3600.0, stays=True),
-    node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
-                   'windows are diagnosed for changes since then', stays=True),
-    node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
-                   'absolute or in the namespace of this one', stays=True),
-)
-
-# Of the samples of a second: from fewer compared ones on the stream is called broken.
-FEW = 0.5
-ENOUGH = 20  # samples in a second, whose share says anything
-LOOK = 0.2  # [s] between looks for an answer of the diagnosis
-
-
 class MonitorNode(ManagedNode):
     """Publishes what the model says at every measured stamp, and how wrong it is.
 
@@ -127,11 +125,8 @@ class MonitorNode(ManagedNode):
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
         self._worker = DiagnosisWorker()
-        parameters: tuple[NodeParameter, ...] = PARAMETERS
-        if is_described(overrides(self)):
-            parameters = tuple(
-                replace(parameter, default=ARM_WINDOW) if parameter.name == 'window' else parameter
-                for parameter in PARAMETERS)
+        parameters = (with_changed(PARAMETERS, 'window', default=ARM_WINDOW)
+                      if is_described(overrides(self)) else PARAMETERS)
         self._settings = ModelParameters(self, arguments, parameters, self._use)
         node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)
@@ -218,7 +213,8 @@ class MonitorNode(ManagedNode):
         if found is None:
             return
         tree, pose = found
-        self._all_joints.publish(conversions.joint_positions(stamp, tree.names, pose.joints))
+        self._all_joints.publish(conversions.joint_state(
+            stamp, position=pose.joints, names=RobotNames(tuple(tree.names), '')))
         if tree.bodies and self._tf is not None:
             self._tf.publish(TFMessage(
                 transforms=conversions.transforms(

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -32,6 +31,7 @@ from pprs_dynamics.ros.node.parameters import (
     node_parameter,
     overrides,
     refuse_unknown,
+    with_changed,
 )
 from pprs_dynamics.ros.node.provenance import arguments_of
 from pprs_dynamics.ros.node.qos import publisher
@@ -66,10 +66,9 @@ PARAMETERS = (
 LONGEST_CATCH_UP = 0.1
 
 # Of an arm or a robot with loops: what goes with its model, given as to the other nodes.
-OF_JOINTS = tuple(
-    replace(parameter, default=EXCITATION, choices=(EXCITATION,))
-    if parameter.name == 'source' else parameter
-    for parameter in PARAMETERS if parameter.name not in ('file', 'lead_in'))
+OF_JOINTS = tuple(parameter for parameter in with_changed(
+    PARAMETERS, 'source', default=EXCITATION, choices=(EXCITATION,))
+    if parameter.name not in ('file', 'lead_in'))
 
 
 class PlayTrajectoryNode(Node):

@@ -16,7 +16,6 @@ was cancelled or aborted: the node then sends it that pose at rest, with its gra
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
-from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
+from pprs_dynamics.ros.node.parameters import drive_count, node_parameter, with_changed
 from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
@@ -81,10 +80,9 @@ class TrajectoryProxyNode(Node):
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
-        parameters = (ACTION, TIMEOUT, *(
-            replace(parameter, default=SPLINE)
-            if parameter.name == 'missing_derivatives' else parameter
-            for parameter in parameters_for(drive_count(self)) if parameter.name in SHARED))
+        parameters = (ACTION, TIMEOUT, *(parameter for parameter in with_changed(
+            parameters_for(drive_count(self)), 'missing_derivatives', default=SPLINE)
+            if parameter.name in SHARED))
         self._settings = ModelParameters(self, arguments, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)

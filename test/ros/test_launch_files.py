@@ -49,6 +49,10 @@ def test_a_launch_file_starts_its_nodes_with_parameters_that_they_have(
         command = [str(word) for word in actions[0].options['cmd'] if isinstance(word, str)]
         assert command[:2] == ['workbench', '--live']
         assert MODEL in command
+        assert '__ns:=/' in command
+        # As of launch's own nodes, a namespace needs no slash.
+        _, actions = described(name, monkeypatch, model=MODEL, namespace='cell')
+        assert '__ns:=/cell' in actions[0].options['cmd']
         return
     nodes = {each.options['executable']: each for each in actions}
     assert {key: type(each).__name__ == 'LifecycleNode' for key, each in nodes.items()} == (

@@ -13,7 +13,7 @@ import re
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import Inputs
-from pprs_dynamics.app.commands.arguments import add_shared, whole
+from pprs_dynamics.app.commands.arguments import UsageError, add_shared, whole
 from pprs_dynamics.app.workbench.server.hub import Hub, Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.errors import MissingLibraryError
@@ -81,5 +81,8 @@ def _live(options: argparse.Namespace, model: DriveModel) -> Any:
         from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                     arguments=['--ros-args', *options.ros_args])
+    try:
+        return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
+                         arguments=['--ros-args', *options.ros_args])
+    except RuntimeError as error:  # the public base of rclpy's own
+        raise UsageError(f'--ros-args: {" ".join(str(error).split())}') from None

@@ -104,13 +104,14 @@ def write_joint_trajectory(
 
 
 def joint_state(
-    stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
-    names: RobotNames = PAPER,
+    stamp: int, effort: Array | None = None, position: Array | None = None,
+    velocity: Array | None = None, names: RobotNames = PAPER,
 ) -> JointState:
-    """Return efforts, and what else is known, at a time [ns]."""
-    message = JointState(name=list(names.joints), effort=doubles(effort))
-    if position is not None and velocity is not None:
-        message.position, message.velocity = doubles(position), doubles(velocity)
+    """Return what is known of the joints at a time [ns]."""
+    message = JointState(name=list(names.joints))
+    for field, values in (('position', position), ('velocity', velocity), ('effort', effort)):
+        if values is not None:
+            setattr(message, field, doubles(values))
     message.header.stamp, message.header.frame_id = time(stamp), names.frame
     return message
 
@@ -118,13 +119,6 @@ def joint_state(
 def efforts(effort: Array) -> Float64MultiArray:
     """Return the drives' efforts, (D,)."""
     return Float64MultiArray(data=doubles(effort))
-
-
-def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointState:
-    """Return positions of joints at a time [ns], without efforts."""
-    message = JointState(name=list(names), position=doubles(position))
-    message.header.stamp = time(stamp)
-    return message
 
 
 def transforms(stamp: int, base: str, links: Sequence[str], poses: Array, prefix: str = '',

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -104,6 +104,13 @@ def node_parameter(
     return NodeParameter(
         name, description, size=size, choices=choices,
         is_text=is_text, may_be_empty=is_text or is_list, default=default, **more)
+
+
+def with_changed(parameters: Iterable[NodeParameter], name: str, **fields: Any,
+                 ) -> tuple[NodeParameter, ...]:
+    """Return parameters, one of which has other fields."""
+    return tuple(replace(parameter, **fields) if parameter.name == name else parameter
+                 for parameter in parameters)
 
 
 def declare_node_parameters(node: Node, parameters: Sequence[NodeParameter]) -> dict[str, Any]:
