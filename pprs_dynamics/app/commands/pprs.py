@@ -193,11 +193,11 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
                                       description=summary[:1].upper() + summary[1:])
         if name not in WITHOUT_MODEL:
             model = command.add_mutually_exclusive_group()
-            model.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
-                               'init writes one')
+            model.add_argument('--model', metavar='FILE', help='model file of your robot, which '
+                               'pprs init writes (default: the paper\'s robot)')
             if name not in WITHOUT_DEMO:
-                model.add_argument('--demo', action='store_true', help='use the model of the '
-                                   f'paper\'s robot, {DEFAULT_MODEL}')
+                model.add_argument('--demo', action='store_true', help='the paper\'s robot, '
+                                   f'{DEFAULT_MODEL}, without a note that no model is given')
         if name not in WITHOUT_JSON:
             command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
                                  help='also write the result as JSON')
