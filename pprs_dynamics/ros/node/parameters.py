@@ -1,7 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The model as ROS 2 parameters: declared from the table of keys, validated by the file's rules."""
+"""The model as ROS 2 parameters: declared from the table of keys, validated by the file's rules.
+
+generate_parameter_library_py makes code of a fixed list, while keys depend on the robot; and there
+is no wheel of it.
+"""
 
 from __future__ import annotations
 

@@ -7,6 +7,9 @@ The server runs with the rights of its user, on an address that every page in th
 reach. So each request has to name our own host (a foreign name that resolves to this machine is
 DNS rebinding), come from our own page, and carry the cookie that a token from the terminal was
 exchanged for. Answers may not be framed, and load and run nothing from elsewhere.
+
+Starlette's own middleware does less: TrustedHostMiddleware ignores the port and a second Host
+header, and SessionMiddleware knows no token that is valid once.
 """
 
 from __future__ import annotations
