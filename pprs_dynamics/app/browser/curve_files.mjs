@@ -1,7 +1,5 @@
 /* What the curves show, as files: SVG for slides and papers, CSV for anything else. */
 
-import {titleOf} from './format.mjs';
-
 const WIDTH = 960, PANEL = 150, GAP = 14, LEFT = 96, RIGHT = 18, TOP = 40, BOTTOM = 58; // [px]
 const WHITE = '#ffffff', INK = '#1a1c20', LINE = '#d8dbe0'; // on white, whatever the page is
 const COLOURS = {before: '#8a9099', now: '#0072b2'}; // as the light page
@@ -108,7 +106,7 @@ export const svgOf = (seen, range) => {
         COLOURS[name]}" stroke-width="1.3" stroke-linejoin="round"/>`);
     }
     parts.push(`<path d="M${LEFT} ${top}V${base}H${right}" fill="none" stroke="${INK}"/>`,
-      text(0, 0, `${titleOf(drive)} [${unit}]`, `font-size="${TITLE}" text-anchor="middle" `
+      text(0, 0, `${drive} [${unit}]`, `font-size="${TITLE}" text-anchor="middle" `
         + `transform="translate(24 ${top + PANEL / 2}) rotate(-90)"`));
   });
   const base = height - BOTTOM;

@@ -93,12 +93,13 @@ const begin = async (since) => {
   curves.use(header.drives, time, arrays.segment.values, rowsOf(arrays.before));
   if (latest[0].length === time.length) curves.setNow(latest);
   bench.curves = curves;
-  const options = (names) => names.map((name) => make('option', titleOf(name), '', {value: name}));
+  const options = (names, title = (name) => name) => names.map(
+    (name) => make('option', title(name), '', {value: name}));
   $('brush-drive').replaceChildren(make('option', 'all drives', '', {value: ''}),
                                    ...options(header.drives));
   $('scatter-drive').replaceChildren(...options(header.drives));
   for (const [id, start] of [['scatter-x', 'velocity'], ['scatter-y', 'error now']]) {
-    $(id).replaceChildren(...options(header.quantities));
+    $(id).replaceChildren(...options(header.quantities, titleOf));
     $(id).value = start;
   }
   const [worst] = Object.entries(server.state.errors).sort((a, b) => b[1].before - a[1].before);
