@@ -17,6 +17,7 @@ from single_axis import AXIS, TIME, Effects, axis, axis_motion, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion, compare
 from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.answer import Answer, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -28,6 +29,7 @@ from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.ledger import read_steps
 
 NOISE = 0.1  # [N]
 LATER = 4321.0  # [s] on the recording's clock
@@ -212,6 +214,13 @@ def test_with_all_that_is_reported_in_the_model_nothing_is_missing(name: str) ->
     assert walk.ended == 'adequate'
     assert set(walk.model.values['effects.active']) == set(HIDDEN[name])
     assert answer(diagnose(walk.model, [recorded(name, 3)])) == ('adequate', [])
+
+
+def test_each_of_several_adopted_effects_has_its_step_in_the_ledger() -> None:
+    recordings = [recorded('two', 1), recorded('two', 2)]
+    book = LedgerBook(tuple(map(RecordingEntry.of, recordings)), ())
+    walk = adopt_all(axis(), recordings, record=book.entered, diagnosis=diagnosed('two', 1, 2))
+    assert {step.effect for step in read_steps(walk.model.values)} == set(HIDDEN['two'])
 
 
 def test_friction_has_the_sign_of_friction_and_is_alike_in_both_directions() -> None:

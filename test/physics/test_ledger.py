@@ -71,6 +71,17 @@ def test_each_step_is_taken_back_exactly_through_files(
         without_last_step(values)
 
 
+def test_a_model_that_was_fitted_to_an_earlier_one_has_all_steps(
+    stages: list[dict[str, Any]],
+) -> None:
+    """Several effects are adopted in the values of one fit, which knows no step in between."""
+    bare = {key: value for key, value in stages[2].items() if not key.startswith('history.')}
+    values = with_step(stages[1], bare, replace(STEP, effect='base_tilt', drives=()))
+    assert [step.effect for step in read_steps(values)] == ['coulomb_friction', 'base_tilt']
+    values, _ = without_last_step(values)
+    assert model_values(values) == stages[1]
+
+
 def test_tolerances_count_from_the_numbers_of_the_first_file(stages: list[dict[str, Any]]) -> None:
     original = original_values(stages[2])
     assert original['masses.payload'] == 1.0

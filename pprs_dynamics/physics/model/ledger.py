@@ -139,7 +139,10 @@ def step_name(number: int) -> str:
 
 
 def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -> dict[str, Any]:
-    """Return the values `after` with a step that leads to them from the values `before`."""
+    """Return the values `after` with a step that leads to them from the values `before`.
+
+    The earlier steps are those of `before`: values that were fitted to an earlier model have none.
+    """
     changed = {key for key in {*before, *after}
                if not key.startswith(f'{BLOCK}.') and as_list(before.get(key, MISSING)) != as_list(
                    after.get(key, MISSING))}
@@ -147,7 +150,8 @@ def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -
                    added=tuple(key for key in after if key in changed - before.keys()),
                    removed=tuple(key for key in before if key in changed - after.keys()))
     number = len(read_steps(before)) + 1
-    return {**after, **kept.as_values(f'{BLOCK}.{step_name(number)}')}
+    earlier = {key: value for key, value in before.items() if key.startswith(f'{BLOCK}.')}
+    return {**after, **earlier, **kept.as_values(f'{BLOCK}.{step_name(number)}')}
 
 
 def without_last_step(values: Mapping[str, Any]) -> tuple[dict[str, Any], Step]:
