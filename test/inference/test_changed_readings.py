@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Efforts without a sign, and positions whose unit changes, are reported as that."""
+"""Efforts without a sign, exchanged drives and positions whose unit changes are reported as that."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -60,3 +61,17 @@ def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     effort[:held] = evidence.force[excerpt.time < TIME[held // 2]][-1]
     effort[:held, 1] = 20.0
     assert told(position, effort) == []
+
+
+@pytest.mark.parametrize('exchanged', ['efforts', 'positions', 'drives'])
+@pytest.mark.parametrize('pair', [(0, 1), (3, 4)])
+def test_exchanged_drives_are_told_where_all_others_fit(exchanged: str, pair: tuple[int, int],
+                                                        ) -> None:
+    """The four drives that fit, or the strongest, do not hide the two that do not."""
+    order = [*range(6)]
+    order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    position = POSITION if exchanged == 'efforts' else POSITION[:, order]
+    one, = told(position, EFFORT if exchanged == 'positions' else EFFORT[:, order])
+    first, second = (MODEL.drives[place] for place in pair)
+    assert one.kind == 'drive_order'
+    assert f'the {exchanged} look recorded in another order: {second} like {first}' in one.text

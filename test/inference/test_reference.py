@@ -154,6 +154,26 @@ def test_what_a_reference_leaves_open_is_no_change(
     assert found.verdict == 'adequate'
 
 
+@pytest.mark.parametrize('exchanged', ['drives', 'positions', 'efforts'])
+@pytest.mark.parametrize('where', ['later', 'before'])
+def test_exchanged_columns_of_two_joints_are_named_beside_a_reference(
+        exchanged: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, order = arm.real_arm(tmp_path), [1, 0, 2]
+    write_model(tmp_path / 'model.yaml', model.values)
+    for name, one in (('before', run(model, 0, 1)), ('later', run(model, 5, 2, change=0.6))):
+        if name == where:
+            one = Recording.from_arrays(
+                name, one.time, one.position[:, order if exchanged != 'efforts' else [0, 1, 2]],
+                None, one.effort[:, order if exchanged != 'positions' else [0, 1, 2]], one.drives)
+        write_recording(tmp_path / f'{name}.csv', one)
+    before, later = (str(tmp_path / f'{name}.csv') for name in ('before', 'later'))
+    assert main(['diagnose', later, '--reference', before, '--model',
+                 str(tmp_path / 'model.yaml')]) == 1
+    said = capsys.readouterr().err
+    assert f'{where}.csv: the {exchanged} look recorded in another order' in said
+    assert 'swing like turn, turn like swing: if so, write into the model file' in said
+
+
 def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None:
     model = arm.real_arm(tmp_path)
     for name, recording in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6))):

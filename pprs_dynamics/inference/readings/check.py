@@ -231,7 +231,8 @@ class Search:
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""
-        if row.kind in ('position_offset', 'drive_order') and self._top().left < table.CLOSE_FIT:
+        if row.kind in ('position_offset', 'drive_order') and (
+                self._top().most_left < table.CLOSE_FIT):
             return False
         if 'drive_order' in {row.kind, *before.kinds}:
             return not before.kinds
