@@ -285,16 +285,17 @@ class FeedforwardNode(ManagedNode):
                 or (reference := self._controller.take_hold()) is None):
             return
         try:
-            self._send_hold(self._feedforward.hold_at(reference))
+            held = self._feedforward.hold_at(reference)
+            self._send_hold(DriveTrajectory.holding(held.forces.drive_motion, held.effort))
         except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
         else:
             self.get_logger().info('the controller has become active: it holds with gravity')
 
-    def _send_hold(self, held: ForceCommand) -> None:
+    def _send_hold(self, held: DriveTrajectory) -> None:
         """Let the trajectory controller hold a pose at rest from now on."""
-        self._sent = DriveTrajectory.holding(held)
-        self._joint_trajectory.publish(self._sent.message(0, self._names))
+        self._sent = held
+        self._joint_trajectory.publish(held.message(0, self._names))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
@@ -373,7 +374,8 @@ class FeedforwardNode(ManagedNode):
             self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'
         if not self._sent.ends_as(held):
-            self._send_hold(held)
+            # Where it stands: beyond the last pose, where it was given a stop.
+            self._send_hold(DriveTrajectory.holding(self._sent.drive_motion, held.effort))
         return ''
 
     # --- status ---------------------------------------------------------------------------------

@@ -132,9 +132,10 @@ class DriveTrajectory(NamedTuple):
                                       self.offsets.tolist(), names, self.effort)
 
     @classmethod
-    def holding(cls, held: ForceCommand) -> DriveTrajectory:
-        """Return the trajectory of one point that holds a pose."""
-        return cls(np.zeros(1, np.int64), held.forces.drive_motion, held.effort)
+    def holding(cls, drive_motion: tuple[Array, ...], effort: Array) -> DriveTrajectory:
+        """Return the trajectory of one point, with efforts (1, D), at the end of a motion."""
+        last = drive_motion[0][-1:]
+        return cls(np.zeros(1, np.int64), (last, np.zeros_like(last), np.zeros_like(last)), effort)
 
     def ends_as(self, held: ForceCommand) -> bool:
         """Return whether the last point is a pose at rest with the efforts of a command."""

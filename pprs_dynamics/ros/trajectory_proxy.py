@@ -165,7 +165,8 @@ class TrajectoryProxyNode(Node):
         except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
             return
-        self._hold.publish(DriveTrajectory.holding(held).message(0, RobotNames.of(model)))
+        self._hold.publish(DriveTrajectory.holding(
+            held.forces.drive_motion, held.effort).message(0, RobotNames.of(model)))
         self.get_logger().info('the controller holds with gravity')
 
     def _check_in_time(self, goal: Any, sent_at: int) -> None:

@@ -108,6 +108,21 @@ def test_a_stale_command_is_acted_on_once_and_the_next_message_recovers(action: 
                 lambda seen=seen: 'OK' in [each['code'] for each in node.bench.status[seen:]])
 
 
+@pytest.mark.parametrize('action', ['hold_gravity', 'zero'])
+def test_a_controller_that_was_given_a_stop_is_held_where_it_stopped(action: str) -> None:
+    with feedforward_bench(command_timeout=0.5, stop_time=0.3, timeout_action=action) as node:
+        node.answer(message_of(MOTION))
+        node.wait_for_status(code='STALE')
+        node.bench.spin_for(TIMEOUT)
+        given, *later = node.joint_trajectory
+        stopped = np.array(given.points[-1].positions)
+        assert np.abs(stopped - FORCES.mechanism.position[-1]).max() > 1e-3  # [m]
+        assert len(later) == (action == 'zero')  # with its gravity it is held already
+        for message in later:
+            np.testing.assert_array_equal([point.positions for point in message.points], [stopped])
+            assert not np.any(message.points[-1].effort)
+
+
 def test_nothing_goes_stale_before_the_first_command_nor_with_a_timeout_of_0() -> None:
     with feedforward_bench(command_timeout=TIMEOUT) as node:
         node.bench.spin_for(3 * TIMEOUT)
