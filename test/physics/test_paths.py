@@ -159,3 +159,12 @@ def test_a_stop_follows_the_path_and_its_derivatives_belong_together(start: floa
     for k in (1, 3, 5, 7):
         way = h / 3 * (stop.velocity[k - 1] + 4 * stop.velocity[k] + stop.velocity[k + 1])
         np.testing.assert_allclose(stop.position[k + 1] - stop.position[k - 1], way, atol=2e-3)
+
+
+def test_a_stop_before_the_first_point_does_not_move() -> None:
+    """A message may be stamped ahead: drives are not yet at its first point, which moves."""
+    stop = PATH.stop(float(POINTS[0]) - 1.0, 0.25)
+    np.testing.assert_allclose(stop.position, np.broadcast_to(PATH.position[0], (
+        len(stop), PATH.position.shape[1])))
+    assert not stop.velocity.any()
+    assert not stop.acceleration.any()

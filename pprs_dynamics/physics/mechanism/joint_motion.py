@@ -120,7 +120,8 @@ class DrivePath(NamedTuple):
     def stop(self, start: float, duration: float) -> JointMotion:
         """Return a motion that brakes smoothly along the path and ends at rest on it.
 
-        The speed along the path falls as (1 - t / duration)^2.
+        The speed along the path falls as (1 - t / duration)^2. Before the first point of the path
+        nothing moves yet.
 
         Parameters
         ----------
@@ -136,8 +137,9 @@ class DrivePath(NamedTuple):
             later than 0 and the last one at rest.
         """
         x = 1 - np.arange(1, STOP_POINTS + 1) / STOP_POINTS
-        path = self.at(start + duration / 3 * (1 - x**3))
-        speed, change = (x**2)[:, None], (-2 * x / duration)[:, None]
+        moments = start + duration / 3 * (1 - x**3)
+        path, moves = self.at(moments), moments >= self.time[0]
+        speed, change = (moves * x**2)[:, None], (moves * -2 * x / duration)[:, None]
         return JointMotion(
             path.position, path.velocity * speed,
             path.acceleration * speed**2 + path.velocity * change, (1 - x) * duration)
