@@ -20,6 +20,7 @@ from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileErro
 from pprs_dynamics.inference.readings.check import find_mistakes, unlike_masses
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
+    GuessError,
     Guess,
     guess_columns,
     joint_in,
@@ -232,6 +233,8 @@ def first_model(
         except AmbiguousColumns as error:
             notes.append(str(error))
             draft.questions += error.lines
+        except GuessError as error:
+            raise GuessError(f'{given[0]}: {error}') from None
         notes += draft.guessed
     if given and not draft.questions:
         notes += _correct(draft, given[0])

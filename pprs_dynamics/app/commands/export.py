@@ -9,16 +9,27 @@ The file is replayed in MuJoCo by inverse dynamics, against the model's own forc
 from __future__ import annotations
 
 import argparse
+import os
+from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import output_file, write_json
+from pprs_dynamics.app.commands.arguments import UsageError, output_file, write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.export.exported_robot import FORMATS, export_robot, express, written
+from pprs_dynamics.physics.model.keys import FILES
+from pprs_dynamics.simulation.export.exported_robot import (
+    FORMATS,
+    MJCF,
+    URDF,
+    export_robot,
+    express,
+    written,
+)
 from pprs_dynamics.simulation.export.replay import Replayed, replay
 from pprs_dynamics.system.files import write_text
+from pprs_dynamics.system.plain_text import displayed
 
-ENDINGS = ('.urdf', '.xml', '.mjcf')
+ENDINGS = {URDF: ('.urdf',), MJCF: ('.xml', '.mjcf')}
 FEW = 8  # names that the terminal lists
 
 EXAMPLE = 'pprs export better.yaml --to mjcf --output better.xml'
@@ -28,14 +39,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='MODEL', help='model file')
     parser.add_argument('--to', choices=FORMATS, required=True, help='format of the file')
-    parser.add_argument('--output', metavar='FILE', type=output_file(*ENDINGS), required=True,
+    parser.add_argument('--output', metavar='FILE', type=output_file(*(
+        ending for endings in ENDINGS.values() for ending in endings)), required=True,
                         help='robot file to write: .urdf for urdf, .xml or .mjcf for mjcf')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
+    if Path(options.output).suffix not in ENDINGS[options.to]:
+        raise UsageError(f'--output is {displayed(options.output)}, must end in '
+                         f'{" or ".join(ENDINGS[options.to])} for --to {options.to}')
     model = DriveModel.load(options.file)
+    described = (model.values.get(key) for key in FILES)
+    if any(path and os.path.realpath(path) == os.path.realpath(options.output)
+           for path in described):
+        raise UsageError(f'{displayed(options.output)}: {displayed(options.file)} reads the robot '
+                         'from it, must be another name for --output')
     expressed = express(model, options.to)
     robot = export_robot(expressed)
     text = written(robot, options.to)

@@ -43,6 +43,8 @@ def run(options: argparse.Namespace) -> int:
                          'edited: delete it, or give another name for --output')
     screen = console()
     drives = [name for name in options.drives.split(',') if name]
+    if options.drives and not drives:
+        raise UsageError(f'--drives is {displayed(options.drives)}, must name joints')
     first = first_model(options.robot, options.recordings, options.output,
                         tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)

@@ -13,7 +13,13 @@ import argparse
 import numpy as np
 
 from pprs_dynamics.app.api.simulate import RATE, simulate
-from pprs_dynamics.app.commands.arguments import number, output_file, seed, tell
+from pprs_dynamics.app.commands.arguments import (
+    UsageError,
+    number,
+    output_file,
+    seed,
+    tell,
+)
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -22,6 +28,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.injection import NAMES, RANDOM
 from pprs_dynamics.simulation.motion_files import read_poses
+from pprs_dynamics.system.plain_text import displayed
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
@@ -52,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = DriveModel.load(find_file(options.model))
-    motion = None if model.moves_joints else _motion(options)
+    motion = _motion(options, model)
     with staged_bar(screen) as progress:
         result = simulate(
             model, options.effect, seed=options.seed, motion=motion, duration=options.duration,
@@ -63,9 +70,12 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _motion(options: argparse.Namespace) -> PlatformMotion | None:
+def _motion(options: argparse.Namespace, model: DriveModel) -> PlatformMotion | None:
     if options.path == 'excitation':
         return None
+    if model.moves_joints:
+        raise UsageError(f'--path is {displayed(options.path)}, must be excitation for {model.title}'
+                         ': only a 3-PPRS follows poses of its platform')
     if options.path != 'helix':
         return read_poses(options.path).resampled(RATE)
     path = HelicalPath()

@@ -131,7 +131,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     left = [item for item in left if item.title or not _rises(item.values)
             or not _counts_rows(item.values)]
     if not left:
-        raise GuessError('no column holds numbers beside times')
+        raise GuessError('no column has numbers other than times, must be positions of the '
+                         'joints beside times')
     stamp: Columns = {('', key): column for key, column in (
         ('time', None if time is None else time.column), ('time_fraction', fraction))
         if column is not None}
