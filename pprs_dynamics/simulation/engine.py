@@ -29,6 +29,7 @@ from pprs_dynamics.physics.mechanism.mjcf import matrix_of, readable_spec
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.parameter_values import source_of_errors
 from pprs_dynamics.physics.model.robot_block import described_gravity
 from pprs_dynamics.simulation.engine_state import TOOL, EngineMotion, EngineState, add_sites
 from pprs_dynamics.simulation.platform import PlatformMechanism
@@ -126,7 +127,8 @@ class MechanismEngine:
         # That the tool applies at its origin, in the base's axes; of each sample, (N, 6), or all.
         self.wrench = np.zeros(6)
         mujoco.mj_setConst(self.model, self.data)
-        self._require_agreement(model)
+        with source_of_errors(model.source):
+            self._require_agreement(model)
         self._described = self.gravity, {
             name: getattr(self.model, name).copy() for name in CHANGED}
 
@@ -169,6 +171,12 @@ class MechanismEngine:
         off = np.abs(ours - theirs)
         if np.max(off) <= AGREEMENT * max(float(np.abs(theirs).max()), 1.0):
             return
+        for row, parameters in zip(model.robot.bodies, model.robot.inertial, strict=True):
+            moments = principal_inertia(parameters)[2]
+            if moments[0] < -AGREEMENT * np.abs(moments).max():
+                raise ModelError('links.inertia', moments.tolist(), 'be moments of at least 0 '
+                                 f'about the centre of mass of what {self._names[int(row)]} moves: '
+                                 'correct links.mass, links.moment or links.inertia, or fit again')
         k, drive = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ModelError(
             "robot.mjcf" if model.values.get("robot.mjcf") else "robot.urdf",

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Efforts without a sign, exchanged drives and positions whose unit changes are reported as that."""
+"""Efforts without a sign, exchanged drives and changed units of positions are reported as that."""
 
 from __future__ import annotations
 

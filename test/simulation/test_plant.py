@@ -390,3 +390,14 @@ def test_a_robot_that_the_engine_does_not_solve_stops_and_says_so() -> None:
         # What is published stays what a robot can say.
         assert np.abs(measurement.position).max() < 1.0
     assert [note.code for note in robot.notes].count('STOPPED') == 1
+
+
+def test_a_body_that_cannot_be_is_named_by_its_moments(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    centre = np.zeros((len(model.robot.bodies), 3))
+    centre[1, 2] = 10.0  # [kg m]: too far away for the moments of what the second drive moves
+    wrong = DriveModel.from_parameters(
+        {**model.values, 'links.moment': tuple(centre.ravel())}, str(tmp_path / 'arm.yaml'))
+    with pytest.raises(ModelError, match=r'arm.yaml: links.inertia is .*, must be moments of at '
+                       'least 0 about the centre of mass of what swing moves'):
+        MechanismEngine(wrong)

@@ -20,8 +20,8 @@ from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileErro
 from pprs_dynamics.inference.readings.check import find_mistakes, unlike_masses
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
-    GuessError,
     Guess,
+    GuessError,
     guess_columns,
     joint_in,
     words_of,

@@ -74,8 +74,8 @@ def _motion(options: argparse.Namespace, model: DriveModel) -> PlatformMotion | 
     if options.path == 'excitation':
         return None
     if model.moves_joints:
-        raise UsageError(f'--path is {displayed(options.path)}, must be excitation for {model.title}'
-                         ': only a 3-PPRS follows poses of its platform')
+        raise UsageError(f'--path is {displayed(options.path)}, must be excitation for '
+                         f'{model.title}: only a 3-PPRS follows poses of its platform')
     if options.path != 'helix':
         return read_poses(options.path).resampled(RATE)
     path = HelicalPath()
