@@ -20,6 +20,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import (
     CONTINUOUS,
     PARAMETERS,
@@ -32,21 +33,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    CONDITION,
-    DETERMINANT,
-    KIND,
-    LOOP,
-    OPEN_IN_MOTION,
-    TRANSLATION,
-    WORST_CONDITION,
-    Data,
-    Integers,
-    JointFriction,
-    Loads,
-    link_jacobians,
-    residual,
-)
+from pprs_dynamics.physics.mechanism.tree_equations import Data, Integers, JointFriction, Loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,24 +77,24 @@ class LinkMotion:
     @property
     def condition(self) -> Array:
         """Condition number of the loops over that at home, (N,); 0 without loops."""
-        home = self.structure.evaluation.at_home[CONDITION]
-        condition: Array = self.motion.solution[:, CONDITION] / (home or 1.0)
+        home = self.structure.evaluation.at_home[tree.CONDITION]
+        condition: Array = self.motion.solution[:, tree.CONDITION] / (home or 1.0)
         return condition
 
     def _require_regular(self) -> None:
-        home = self.structure.evaluation.at_home[DETERMINANT]
-        lost = ~(self.motion.solution[:, DETERMINANT] * home > 0)
+        home = self.structure.evaluation.at_home[tree.DETERMINANT]
+        lost = ~(self.motion.solution[:, tree.DETERMINANT] * home > 0)
         if lost.any():
             raise SingularityError(
                 int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
                 'singularity', 'the determinant of the loops must keep its sign')
         condition = self.condition
-        poor = ~(condition < WORST_CONDITION)
+        poor = ~(condition < tree.WORST_CONDITION)
         if poor.any():
             worst = int(np.argmax(poor))
             raise SingularityError(
                 worst, f'the loops are {condition[worst]:.3g} times worse conditioned than at home',
-                f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
+                f'must be below {tree.WORST_CONDITION:g}: the drives nearly lose hold')
 
     def _require_closed(self) -> None:
         """Raise WorkspaceError where rows that others implied at home no longer follow from them.
@@ -119,18 +106,19 @@ class LinkMotion:
         if not len(implied):
             return
         m = Data(*(np.moveaxis(array, 0, -1) for array in self.motion))  # equations on arrays
-        residuals = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
+        residuals = np.stack([tree.residual(t, m, int(r)) for r in implied], axis=-1)
         size = np.abs(residuals) / t.row_unit[implied]
-        if np.all(size < OPEN_IN_MOTION):
+        if np.all(size < tree.OPEN_IN_MOTION):
             return
-        sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
+        sample = int(np.argmax(~np.all(size < tree.OPEN_IN_MOTION, axis=1)))
         worst = int(np.argmax(size[sample]))
         row = implied[worst]
         by = abs(residuals[sample, worst])
-        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, KIND] == TRANSLATION
+        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, tree.KIND] == tree.TRANSLATION
                   else f'{np.degrees(by):.3g} degrees')
+        loop = self.structure.loops[t.rows[row, tree.LOOP]]
         raise WorkspaceError(
-            sample, f'the loop {self.structure.loops[t.rows[row, LOOP]].name} is open by {amount}',
+            sample, f'the loop {loop.name} is open by {amount}',
             'must close as at home, where it follows from the other loops and joints alone: name a '
             'robot.home at which no links are in line')
 
@@ -143,7 +131,7 @@ class LinkMotion:
     @cached_property
     def link_jacobians(self) -> tuple[Array, Array]:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
-        return link_jacobians(self.structure.tables, self.motion, self.motion.drive_to_joint)
+        return tree.link_jacobians(self.structure.tables, self.motion, self.motion.drive_to_joint)
 
     def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None) -> Loads:
         """Return what joints and closures transmit without friction; see `Evaluation.forces`."""

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ConvergenceError, ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import (
     FLOATING,
     PARAMETERS,
@@ -43,24 +44,10 @@ from pprs_dynamics.physics.mechanism.state import (
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    COEFFICIENT,
-    JOINT_EFFORT,
-    RIGID,
-    VISCOUS,
-    WIDTH,
-)
 from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import (
-    FRICTIONLESS_DRIVES,
-    FRICTIONLESS_JOINTS,
-    Chain,
-    DriveParameters,
-    Joints,
-    Parameters,
-)
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Joints
 
 
 @dataclass(frozen=True)
@@ -285,7 +272,7 @@ class ClosedForm:
         self.table = table
         self.position, self.velocity, self.acceleration = (
             table[closed_form.POSITION:closed_form.ACCELERATION + 1])
-        self.efforts, self.guide_load = table[RIGID], table[closed_form.GUIDE_LOAD]
+        self.efforts, self.guide_load = table[tree.RIGID], table[closed_form.GUIDE_LOAD]
         self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
         self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
 
@@ -321,7 +308,7 @@ class ClosedForm:
 
         By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
         """
-        found: Array = loads._with(joints).table[JOINT_EFFORT]
+        found: Array = loads._with(joints).table[tree.JOINT_EFFORT]
         return found
 
     def _with(self, joints: Joints) -> ClosedForm:
@@ -472,7 +459,7 @@ class ThreePprs:
         return replace(self, masses=altered)
 
     @cached_property
-    def _chains(self) -> tuple[Chain, ...]:
+    def _chains(self) -> tuple[closed_form.Chain, ...]:
         """Constants of the chains."""
         geometry, masses = self.geometry, self.masses
         delta = np.asarray(geometry.chain_angles)
@@ -483,7 +470,7 @@ class ThreePprs:
         balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
         constants = np.stack((cos, sin, joints.real, joints.imag, *left, balance, masses.slides,
                               masses.lifts, masses.rods), axis=1)
-        return tuple(Chain(*chain) for chain in constants.tolist())
+        return tuple(closed_form.Chain(*chain) for chain in constants.tolist())
 
     def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
         """Return the parameters of `closed_form.forces`, for `one_pass`.
@@ -495,10 +482,11 @@ class ThreePprs:
             Without it the drives have no friction.
         """
         geometry, masses, bounds = self.geometry, self.masses, self.bounds
-        friction = FRICTIONLESS_DRIVES if drives is None else tuple(
-            DriveParameters(*drive) for drive in drives[[VISCOUS, COEFFICIENT, WIDTH]].T.tolist())
+        friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
+            closed_form.DriveParameters(*drive)
+            for drive in drives[[tree.VISCOUS, tree.COEFFICIENT, tree.WIDTH]].T.tolist())
         first, second, third = self._chains
-        return row_of(Parameters(
+        return row_of(closed_form.Parameters(
             geometry.base_radius, geometry.rod_length, geometry.platform_radius,
             geometry.elbow_sign, (first, second, third), masses.total, Vector(*masses.centre),
             Vector(*masses.inertia[:3]), Vector(*masses.inertia[3:]), Vector(*self.gravity),
