@@ -335,8 +335,7 @@ class Mechanism:
 
     def friction_load(self, state: MechanismState) -> Array:
         """Return what the drives' gears carry [N m, N], (N, D)."""
-        load: Array = np.abs(state.transmitted)
-        return load
+        return np.abs(state.transmitted)
 
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""

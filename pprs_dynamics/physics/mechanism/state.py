@@ -221,8 +221,7 @@ class MechanismState(JointMotion):
     @lazy
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
-        efforts: Array = self.transmitted + self.robot.armature * self.acceleration
-        return efforts
+        return self.transmitted + self.robot.armature * self.acceleration
 
     @property
     def transmitted(self) -> Array:

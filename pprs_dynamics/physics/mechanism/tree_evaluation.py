@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.tree_equations import (
     EFFORTS,
@@ -34,7 +35,7 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     views,
 )
 
-NOWHERE = np.zeros(4)
+NOWHERE, NO_GRAVITY = np.zeros(4), np.zeros(3)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
@@ -71,10 +72,11 @@ class Evaluation:
         self.tables, self.home, self.packed = t, home, packed_tables(t)
         self.sizes = self.packed.sizes
         self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
-        self._no_bodies = np.zeros((len(t.joints), 10))
         self._friction = NO_FRICTION, np.array(NO_FRICTION)
+        # Of stages that take no motion or no bodies, or give no efforts.
         drives = len(t.drives)
         self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
+        self._no_bodies = np.zeros((len(t.joints), PARAMETERS))
         self._no_actuators = np.zeros((OF_DRIVE, drives))
         self._no_actuators[WIDTH] = 1.0
 
@@ -112,8 +114,7 @@ class Evaluation:
             The first sample at which the loops do not close, or -1.
         """
         rows = np.zeros((len(q), self._lengths[0]))
-        failed = self._run(np.array((q, v, a)), start, rows, MOTION | KEPT, np.zeros(3), nearby)
-        return rows, failed
+        return rows, self._run(MOTION | KEPT, rows, np.array((q, v, a)), start, nearby)
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
                wrenches: Mapping[int, tuple[Array, Array]]) -> Loads:
@@ -133,7 +134,7 @@ class Evaluation:
         for joint, (force, moment) in wrenches.items():
             o.f[:, joint] += force
             o.n[:, joint] += moment
-        self._run(None, None, rows, FORCES | KEPT, gravity, None, inertial, loads)
+        self._run(FORCES | KEPT, rows, bodies=(inertial, gravity, loads))
         return o
 
     def joint_friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
@@ -175,35 +176,29 @@ class Evaluation:
         InverseDynamicsResult or None
             None where a sample is out of reach or singular, which `forward_kinematics` says.
         """
-        given = np.array(motion)
+        given, last = np.array(motion), self._friction
+        if friction is not last[0]:
+            last = self._friction = friction, np.array(friction)
         samples, drives = given.shape[1:]
         closed, efforts = np.empty((samples, len(self.home))), np.empty((EFFORTS, samples, drives))
         failed = self._run(
-            given, start, np.empty((1, self._lengths[0])), MOTION | FORCES, gravity, nearby,
-            inertial, np.empty((1, self._lengths[1])), friction,
-            self._no_actuators if actuators is None else actuators, closed, efforts)
+            MOTION | FORCES, np.empty((1, self._lengths[0])), given, start, nearby,
+            (inertial, gravity, np.empty((1, self._lengths[1]))),
+            (last[1], self._no_actuators if actuators is None else actuators, closed, efforts))
         return None if failed >= 0 else InverseDynamicsResult(closed, efforts, motion)
 
-    def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
-             gravity: Array, nearby: Array | None, inertial: Array | None = None,
-             loads: Array | None = None, friction: JointFriction = NO_FRICTION,
-             actuators: Array | None = None, closed: Array | None = None,
-             efforts: Array | None = None) -> int:
+    def _run(self, stages: int, rows: Array, given: Array | None = None,
+             start: Array | None = None, nearby: Array | None = None,
+             bodies: tuple[Array, Array, Array] | None = None,
+             results: tuple[Array, Array, Array, Array] | None = None) -> int:
         """Evaluate stages, and return the first sample that fails or -1; see `evaluate`."""
-        if closed is None or efforts is None or actuators is None:
-            closed, efforts, actuators = (
-                np.empty((len(rows), len(self.home))), self._no_efforts, self._no_actuators)
-        if given is None:
-            given = self._no_motion
-        if loads is None or inertial is None:
-            loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
-        last = self._friction
-        if friction is not last[0]:
-            last = self._friction = friction, np.array(friction)
         warm = nearby is not None
-        at_home = self.at_home if warm or not stages & KEPT else NOWHERE
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
         return int(run(
-            evaluate, *self.packed, self.home, at_home, np.array(first), given, rows, inertial,
-            gravity, loads, last[1], actuators, closed, efforts, stages, warm))
+            evaluate, *self.packed, self.home,
+            self.at_home if warm or not stages & KEPT else NOWHERE, np.array(first),
+            self._no_motion if given is None else given, rows,
+            *(bodies or (self._no_bodies, NO_GRAVITY, np.empty((len(rows), self._lengths[1])))),
+            *(results or (np.array(NO_FRICTION), self._no_actuators,
+                          np.empty((len(rows), len(self.home))), self._no_efforts)), stages, warm))

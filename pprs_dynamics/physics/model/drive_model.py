@@ -200,9 +200,8 @@ class DriveModel:
     def faults(self) -> tuple[str, ...]:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
         structure = self.robot.structure
-        faults: tuple[str, ...] = (() if structure is None or self.values.get('links.inertia')
+        return (() if structure is None or self.values.get('links.inertia')
                                    else structure.description.faults)
-        return faults
 
     @property
     def efforts_in_amperes(self) -> bool:
@@ -339,19 +338,27 @@ class DriveModel:
             Where an effect of another package fails.
         """
         self._require_motion(motion)
-        found = self._one_pass(motion, None if state is None else state.closed)
+        parameters, closed = self._own_parameters, None if state is None else state.closed
+        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
+                                                                    bool(self._added))
         if found is None:
+            # No pass, or a sample out of reach or near a singularity: every sample is checked.
             # Very large numbers overflow; users of the result check that it is finite.
             with np.errstate(over='ignore', invalid='ignore'):
-                mechanism = self.mechanism(motion, None if state is None else state.closed)
-                found = self.forces_at(mechanism, state)
+                mechanism = self.mechanism(motion, closed)
+                forces = self.forces_at(mechanism, state)
             if state is not None:
-                self.robot.remember(mechanism, state.closed)
-        elif self._added:
-            return self._with_effects(self._added, found.parts, found.mechanism, state)
-        elif state is not None:
+                self.robot.remember(mechanism, closed)
+            return forces
+        forces = Forces(
+            found.efforts[rows.TOTAL], lambda: self._own_parts(found.efforts),
+            lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),
+            found.motion)
+        if self._added:
+            return self._with_effects(self._added, forces.parts, forces.mechanism, state)
+        if state is not None:
             state.advance(motion.time, self.initial_state)
-        return found
+        return forces
 
     @cached_property
     def _own_parameters(self) -> Any:
@@ -370,20 +377,6 @@ class DriveModel:
             elif isinstance(effect, BodyEffect | IndependentChainsFriction):
                 return None
         return self.robot.friction_parameters(self._joint_friction, drives)
-
-    def _one_pass(self, motion: Any, closed: dict[Any, Array] | None) -> Forces | None:
-        """Return the forces of bodies and own friction, from one pass that stores nothing else.
-
-        None for a motion that has no pass, and where a sample may be out of reach or too near a
-        singularity: the caller must check every sample then.
-        """
-        parameters = self._own_parameters
-        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
-                                                                    bool(self._added))
-        return None if found is None else Forces(
-            found.efforts[rows.TOTAL], lambda: self._own_parts(found.efforts),
-            lambda: self.robot.state(motion, self.reversal, self._joint_friction, found=found),
-            found.motion)
 
     def _own_parts(self, efforts: Array) -> dict[str, Array]:
         """Return the parts of efforts by name, in the order of the effects."""

@@ -306,14 +306,13 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
 
 def _require_driven_bodies(robot: Mechanism) -> None:
     """Raise ModelError for a drive that moves no mass at home."""
-    structure = robot.structure
-    home = structure.home[None, structure.tables.drives]
-    for d, name in enumerate(structure.drives):
-        pushed = np.zeros_like(home)
-        pushed[0, d] = 1.0
-        rest = np.zeros_like(home)
-        with not_compiling_yet():
-            moved, still = (robot.torques(home, rest, state)[0, d] for state in (pushed, rest))
-        if not moved - still + robot.armature[d] > 0:
+    structure, count = robot.structure, len(robot.drives)
+    pushed = np.eye(count + 1, count)  # one drive after the other, and none
+    home = np.tile(structure.home[structure.tables.drives], (count + 1, 1))
+    with not_compiling_yet():
+        efforts = robot.torques(home, np.zeros_like(home), pushed)
+    felt = np.diag(efforts[:-1] - efforts[-1]) + robot.armature
+    for name, inertia in zip(structure.drives, felt, strict=True):
+        if not inertia > 0:
             raise ModelError(DRIVES_KEY, name,
                              'move a body: no link that it moves has a mass')

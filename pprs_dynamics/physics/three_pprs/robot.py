@@ -285,14 +285,12 @@ class ClosedForm:
     @property
     def J(self) -> Array:
         """[J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
-        J: Array = self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
-        return J
+        return self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
 
     @property
     def tool_velocity(self) -> Array:
         """Velocity of o and angular velocity of the platform, in `base`, (N, 6)."""
-        velocity: Array = self.motion.rows[:, 7:13]
-        return velocity
+        return self.motion.rows[:, 7:13]
 
     def joint_position(self, joint: str) -> Array:
         """Return the angles u_i of the joints C_i, (N, 3) [rad]."""

@@ -66,8 +66,7 @@ class DriveOffset(Effect):
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
-        force: Array = 0.0 * state.velocity + self._row
-        return force
+        return 0.0 * state.velocity + self._row
 
     @cached_property
     def _row(self) -> Array:

@@ -109,8 +109,7 @@ def warmer_than(drive: DriveSamples, reference: float) -> Array:
     temperature = drive.channels.get(TEMPERATURE)
     if temperature is None:
         return np.zeros_like(drive.velocity)
-    warmer: Array = np.where(np.isfinite(temperature), temperature - reference, 0.0)
-    return warmer
+    return np.where(np.isfinite(temperature), temperature - reference, 0.0)
 
 
 def middle_temperature(covered: DriveRange) -> tuple[float, float]:
