@@ -30,7 +30,7 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, _is_sound, read_parameters
+from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, _is_regular, read_parameters
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -215,7 +215,8 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     """Print the floating-point operations of one sample."""
     _Counted.counts.clear()
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    _is_sound(_counted(read_parameters(model._own_parameters)), 0, table, NO_LOAD, _CountedTable())
+    parameters = _counted(read_parameters(model._own_parameters))
+    _is_regular(parameters, 0, table, NO_LOAD, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

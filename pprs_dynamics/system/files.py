@@ -20,6 +20,11 @@ from typing import IO
 
 from pprs_dynamics.errors import UnreadableFileError
 
+# Of what is not finished. Short: with the target's own name it could be too long.
+PREFIX = '.pprs_'
+KINDS = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',
+         stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device'}
+
 
 def require_file(path: str | PathLike[str]) -> None:
     """Raise UnreadableFileError where a path is nothing that can be read to its end."""
@@ -43,12 +48,6 @@ def require_files(model: str, parameters: str) -> list[str]:
     for file in files:
         require_file(file)
     return files
-
-
-# Of what is not finished. Short: with the target's own name it could be too long.
-PREFIX = '.pprs_'
-KINDS = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',
-         stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device'}
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveRange,
     Windup,
 )
-from pprs_dynamics.physics.effects.laws.elastic_joint import told_by_windup
+from pprs_dynamics.physics.effects.laws.elastic_joint import load_by_windup
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
@@ -107,7 +107,7 @@ class SecondEncoders:
             if not np.any(lead):
                 continue
             if np.ptp(load):
-                stiffness, damping, windup = told_by_windup(load, lead)
+                stiffness, damping, windup = load_by_windup(load, lead)
                 if stiffness > 0:
                     windups[d] = Windup(1 / stiffness, damping / stiffness,
                                         float(np.var(windup) / np.var(load)))

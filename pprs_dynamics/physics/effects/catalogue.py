@@ -13,29 +13,28 @@ from __future__ import annotations
 
 import inspect
 import pkgutil
+import sys
 import warnings
-from functools import cache
+from collections.abc import Callable
+from functools import cache, wraps
 from importlib import import_module
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.errors import EffectError
+import numpy as np
+
+from pprs_dynamics.errors import EffectError, ModelError, WorkspaceError
 from pprs_dynamics.physics.effects import laws
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter, names
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-import sys
-from collections.abc import Callable
-from functools import wraps
-from traceback import walk_tb
 
-import numpy as np
-
-from pprs_dynamics.errors import ModelError, WorkspaceError
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import names
+GROUP = 'pprs_dynamics.effects'
+# Parts of the drive forces and keys of the block `effects` that have these names already.
+RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
 
 def guard(effect: type[CatalogueEffect]) -> None:
@@ -95,11 +94,6 @@ def check_columns(effect: type[DriveEffect]) -> None:
         if np.shape(column) != row.shape or not np.all(np.isfinite(column)):
             raise EffectError(effect.name, f'columns returned {column!r:.80} for three samples, '
                               'must be three finite numbers')
-
-
-GROUP = 'pprs_dynamics.effects'
-# Parts of the drive forces and keys of the block `effects` that have these names already.
-RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
 
 def _laws() -> dict[str, type[CatalogueEffect]]:

@@ -22,6 +22,7 @@ from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, SLIDE, Me
 # 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.
 EXPONENTS = 1 / 3
 LEAST_SHARE = 1e-3  # of the usual size, below which the logarithm goes no further
+ALONE = 'drive'  # name of one whose name does not matter
 
 
 def other_exponent(quantity: Array, column: Array) -> Array:
@@ -36,9 +37,6 @@ def other_exponent(quantity: Array, column: Array) -> Array:
     size = np.abs(quantity)
     usual = np.sqrt(np.mean(size ** 2)) or 1.0
     return EXPONENTS * np.log(np.maximum(size / usual, LEAST_SHARE)) * column
-
-
-ALONE = 'drive'  # name of one whose name does not matter
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, Str
 
 # Linear parameters and variants of an effect at one place.
 OfPlace = tuple[tuple[Parameter, ...], Sequence[tuple[str, ...]]]
+AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
+KEPT = 0.05  # of a body that cannot be taken off it
+LARGEST = 1e3  # [kg]
 
 
 class StructureEffect(CatalogueEffect):
@@ -130,12 +134,6 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 
 class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force in addition to the rigid body's."""
-
-
-AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
-OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
-KEPT = 0.05  # of a body that cannot be taken off it
-LARGEST = 1e3  # [kg]
 
 
 def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,

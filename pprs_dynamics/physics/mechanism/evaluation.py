@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from itertools import count
 from typing import Any
 
@@ -100,24 +100,23 @@ def _must_not_wait() -> bool:
     return thread in _waiting or bool(_compiling - {thread})
 
 
-@contextmanager
-def compiling_here() -> Iterator[None]:
+def compiling_here() -> AbstractContextManager[None]:
     """While the block lasts other threads do not wait for what is not compiled yet."""
-    _compiling.add(threading.get_ident())
-    try:
-        yield
-    finally:
-        _compiling.discard(threading.get_ident())
+    return _listed_in(_compiling)
 
 
-@contextmanager
-def not_compiling_yet() -> Iterator[None]:
+def not_compiling_yet() -> AbstractContextManager[None]:
     """While the block lasts this thread does not wait for what is not compiled yet.
 
     For the few samples that building a model takes: a node must be there before it compiles.
     """
-    _waiting.add(threading.get_ident())
+    return _listed_in(_waiting)
+
+
+@contextmanager
+def _listed_in(threads: set[int]) -> Iterator[None]:
+    threads.add(threading.get_ident())
     try:
         yield
     finally:
-        _waiting.discard(threading.get_ident())
+        threads.discard(threading.get_ident())

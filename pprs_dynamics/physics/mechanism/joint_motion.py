@@ -17,6 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion import checked_matrix, checked_times, spline_through
 
 GRID = 512  # points of a period at which peaks are looked for
+STOP_POINTS = 10
 
 
 @cache
@@ -76,9 +77,6 @@ class JointSeries:
         w = omega[:, None]
         return JointMotion(self.middle + (c - 1) @ a + s @ b, c @ (w * b) - s @ (w * a),
                            -(c @ (w * w * a)) - s @ (w * w * b), time)
-
-
-STOP_POINTS = 10
 
 
 class DrivePath(NamedTuple):

@@ -35,6 +35,14 @@ from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure
 from pprs_dynamics.physics.mechanism.tree_equations import Data, Integers, JointFriction, Loads
 
+COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
+SLIDES = 3  # the first of them
+AXES = np.eye(3)[[0, 1, 2, 2, 1, 0]]
+POSE = 'tool_pose.'  # what the names of their joints begin with
+# What a robot with less than six drives cannot choose may be off by this much [m, rad]: poses in
+# messages are rounded, and a tool's frame is drawn to no better.
+FOLLOWED = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
@@ -208,15 +216,6 @@ class LinkMotion:
                 column = column + W[:, :, j] * wd[:, :, i] + c[:, :, j] * w[:, :, i]
             found[..., 4 + k] = column.transpose(0, 2, 1)
         return found.reshape(samples, drives, -1)
-
-
-COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
-SLIDES = 3  # the first of them
-AXES = np.eye(3)[[0, 1, 2, 2, 1, 0]]
-POSE = 'tool_pose.'  # what the names of their joints begin with
-# What a robot with less than six drives cannot choose may be off by this much [m, rad]: poses in
-# messages are rounded, and a tool's frame is drawn to no better.
-FOLLOWED = 1e-3
 
 
 class ToolPose:

@@ -29,6 +29,15 @@ from pprs_dynamics.physics.mechanism.vectors import rotation_matrix, sqrt
 
 # A quaternion printed with three decimals is still accepted; a Euler triple with a 0 is not.
 UNIT_LENGTH_TOLERANCE = 1e-3
+FEWEST_POSES = 4
+QUINTIC_FROM = 6  # points; below, the splines are cubic
+QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
+              'linear_acceleration', 'angular_acceleration')
+WIDTHS = [3, 4, 3, 3, 3, 3]
+ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
+FLOAT = np.dtype(np.float64)
+NO_CHANNELS: Mapping[str, Array] = {}
+MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
 def checked_matrix(
@@ -88,10 +97,6 @@ def checked_times(time: ArrayLike, samples: int) -> Array:
         raise MotionError('time', f'sample {row + 1} at {times[row + 1]:.9g} s follows '
                           f'{times[row]:.9g} s', 'strictly increase', 'time')
     return times
-
-
-FEWEST_POSES = 4
-QUINTIC_FROM = 6  # points; below, the splines are cubic
 
 
 def load_splines() -> None:
@@ -219,15 +224,6 @@ def _vector_part(a: Array, b: Array) -> Array:
     return b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
 
 
-QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
-              'linear_acceleration', 'angular_acceleration')
-WIDTHS = [3, 4, 3, 3, 3, 3]
-ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
-FLOAT = np.dtype(np.float64)
-NO_CHANNELS: Mapping[str, Array] = {}
-MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
-
-
 def _columns(first: int, end: int, description: str) -> cached_property[Array]:
     """Return a property of a motion that holds columns of its rows."""
     columns = cached_property(lambda motion: np.ascontiguousarray(motion.rows[:, first:end]))
@@ -277,7 +273,7 @@ class PlatformMotion:
         columns = (position, orientation, linear_velocity, angular_velocity, linear_acceleration,
                    angular_acceleration)
         rows = _joined(columns)
-        if rows is None or not _is_sound(rows):
+        if rows is None or not _is_finite_and_unit(rows):
             rows = _checked(columns)
         self.__dict__['rows'] = rows
         if time is not None:
@@ -387,7 +383,7 @@ class PlatformMotion:
     def from_rows(cls, rows: Array, time: ArrayLike | None = None) -> PlatformMotion:
         """Return the motion in a table such as `rows`, an (N, 19) array of floats."""
         checked = np.array(rows)
-        if not len(rows) or not _is_sound(checked):
+        if not len(rows) or not _is_finite_and_unit(checked):
             # The constructor raises the specific error.
             P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
             return cls(P, q, v, omega, a, epsilon, time)
@@ -456,7 +452,7 @@ def _joined(columns: Sequence[Any]) -> Array | None:
     return rows if right else None
 
 
-def _is_sound(rows: Array) -> bool:
+def _is_finite_and_unit(rows: Array) -> bool:
     """Normalise quaternions in place; return False where `_checked` is to look at the rows.
 
     Nothing is compiled or loaded for that alone.

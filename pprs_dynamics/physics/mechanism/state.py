@@ -23,6 +23,9 @@ from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMI
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.system.parallel import lazy
 
+# Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
+PLATFORM, SLIDE, MECHANISM = 'platform', 'slide', 'mechanism'
+
 
 @dataclass(frozen=True)
 class Reversal:
@@ -50,10 +53,6 @@ class Reversal:
 def smooth_sign(velocity: Any, reversal_velocity: Any) -> Any:
     """Return sgn(v) as tanh(v / v_rev); a width per column of (N, D) velocities is allowed."""
     return np.tanh(velocity / reversal_velocity)
-
-
-# Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
-PLATFORM, SLIDE, MECHANISM = 'platform', 'slide', 'mechanism'
 
 
 class PassiveJoint(NamedTuple):

@@ -55,6 +55,16 @@ from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]
+# Files round angles such as pi / 2 to four digits; poorer conditions make no robot.
+RANK = 1e-4  # of the largest singular value
+OPEN = 1e-4  # of the size: by which a loop may be open at home, in rows that others imply
+TRIES = 60  # Newton steps to home
+LONGEST_STEP = 0.2  # of the size, or rad, in one of them
+CLOSED_HOME = 1e-12  # of the size
+# Drives move by these between closings when a motion is walked to.
+STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
+ROTATING = ('spherical', 'revolute', 'universal')  # closures whose friction is one of turns
+SPIN = 0.02  # weight of how far a centre of mass moves when a held coordinate does
 
 
 def _along(axis: int) -> Row:
@@ -80,12 +90,6 @@ ROWS: dict[str, tuple[Row, ...]] = {
     'prismatic': (_along(X), _along(Y), _turn(X), _turn(Y), _turn(Z)),
     'fixed': (*POINT, _turn(X), _turn(Y), _turn(Z)),
 }
-# Files round angles such as pi / 2 to four digits; poorer conditions make no robot.
-RANK = 1e-4  # of the largest singular value
-OPEN = 1e-4  # of the size: by which a loop may be open at home, in rows that others imply
-TRIES = 60  # Newton steps to home
-LONGEST_STEP = 0.2  # of the size, or rad, in one of them
-CLOSED_HOME = 1e-12  # of the size
 
 
 @dataclass(frozen=True)
@@ -278,12 +282,6 @@ def columns_of(coordinates: Integers, count: int) -> Integers:
     column = np.full(count, -1)
     column[coordinates] = np.arange(len(coordinates))
     return column
-
-
-# Drives move by these between closings when a motion is walked to.
-STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
-ROTATING = ('spherical', 'revolute', 'universal')  # closures whose friction is one of turns
-SPIN = 0.02  # weight of how far a centre of mass moves when a held coordinate does
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,25 @@ JOINT, SIGN = 0, 1
 UNIT = 2  # column of `row_reals`
 # Of `Data.solution`.
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
+# Rows of the parameters of drives, and of the efforts that follow from them.
+ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+# Names of the numbers of rows of the tables, and of the columns of some.
+SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'solved')
+FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
+N = TypeVar('N', bound=tuple[Any, ...])
+CLOSED = 1e-7  # [m, rad] of a row and of the last Newton step, after which the error is its square
+MOST_STEPS = 25  # of Newton
+LONGEST_STEP = 0.3  # [m, rad] of a coordinate in a Newton step
+MOST_STRIDES = 400  # of the drives from where a motion was closed last
+WARM_STEPS = 6  # of Newton, in which loops close that were closed within a stride
+# Condition number of the loops, lengths in units of the mechanism's size, over that at home.
+WORST_CONDITION = 300.0
+# Of the size: by which rows may be open that others imply at home. Roundings of a file add up.
+OPEN_IN_MOTION = 1e-3
+# Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
+# joints. Where rows are kept there is one for each sample, else one that all use in turn.
+MOTION, FORCES, KEPT = 1, 2, 4
 
 
 def _vector(k: int) -> Any:
@@ -241,15 +260,6 @@ class JointFriction(NamedTuple):
     width: Any
 
 
-# Rows of the parameters of drives, and of the efforts that follow from them.
-ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
-TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
-
-
-# Names of the numbers of rows of the tables, and of the columns of some.
-SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'solved')
-
-
 @cache
 def _shapes(kind: type) -> dict[str, tuple[str | int, ...]]:
     """Return the shapes that the fields of tables are annotated with, by name."""
@@ -263,10 +273,6 @@ def _sizes_of(t: Model) -> Integers:
              for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
     found['solved'] = len(t.passive) + len(t.drives)
     return np.array([found[name] for name in SIZES], dtype=np.int64)
-
-
-FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
-N = TypeVar('N', bound=tuple[Any, ...])
 
 
 class PackedTables(NamedTuple):
@@ -340,17 +346,6 @@ def _is_real(name: str) -> bool:
 
 
 read_tables, read_motion, read_loads = (_reader(kind) for kind in (Model, Data, Loads))
-
-
-CLOSED = 1e-7  # [m, rad] of a row and of the last Newton step, after which the error is its square
-MOST_STEPS = 25  # of Newton
-LONGEST_STEP = 0.3  # [m, rad] of a coordinate in a Newton step
-MOST_STRIDES = 400  # of the drives from where a motion was closed last
-WARM_STEPS = 6  # of Newton, in which loops close that were closed within a stride
-# Condition number of the loops, lengths in units of the mechanism's size, over that at home.
-WORST_CONDITION = 300.0
-# Of the size: by which rows may be open that others imply at home. Roundings of a file add up.
-OPEN_IN_MOTION = 1e-3
 
 
 def vector(table: Any, j: int, k: int) -> Vector:
@@ -921,11 +916,6 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
                     of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
                         vector(links, i, Z), moment)
     project_to_actuators(t, m, of_tree, efforts)
-
-
-# Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
-# joints. Where rows are kept there is one for each sample, else one that all use in turn.
-MOTION, FORCES, KEPT = 1, 2, 4
 
 
 def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,

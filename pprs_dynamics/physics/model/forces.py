@@ -21,6 +21,7 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 RIGID_BODY = 'rigid_body'
 # The model's own friction, in its drives and in its passive joints.
 ACTIVE_FRICTION, PASSIVE_FRICTION = 'active_friction', 'passive_friction'
+LOWER, UPPER, EFFORT = 0, 1, 2  # rows of the kernel's table
 
 
 class Forces:
@@ -135,9 +136,6 @@ class ModelState:
         state.end = self.end
         state.closed = dict(self.closed)
         return state
-
-
-LOWER, UPPER, EFFORT = 0, 1, 2  # rows of the kernel's table
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,30 @@ EQUATIONS = ('corrected', 'printed')
 ANY = -1
 LARGEST = 1e300  # beyond it is no physical quantity, and squares overflow
 APPROACHES = ('whole_mechanism', 'independent_chains')
+# Units of recorded efforts, and what they are in N m or N; amperes are multiplied by the gain.
+EFFORT_UNITS = {'N m': 1.0, 'N': 1.0, 'A': 1.0, 'mN m': 1e-3, 'mN': 1e-3, 'kN m': 1e3, 'kN': 1e3,
+                'N cm': 1e-2, 'kgf cm': 0.0980665, 'kgf m': 9.80665, 'kgf': 9.80665,
+                'lbf in': 0.1129848290276167}
+ROBOT = 'robot'  # block that describes a mechanism
+DRIVES_KEY, GAIN, LOCKED = 'robot.drives', 'robot.gain', 'robot.locked.'
+FILES = ('robot.urdf', 'robot.mjcf')  # keys that hold paths
+LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
+POSE = '_pose'
+JOINTS, MOTORS, HOME = 'friction.joints.', 'friction.motors.', 'robot.home.'
+# Blocks whose keys are not listed one by one.
+ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
+         'columns.', 'effort_kind', 'reference')
+# Keys of ROS 2 itself and of single nodes, which may stand in the same file.
+NODE_KEYS = frozenset({
+    'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in', 'ahead',
+    'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay', 'window',
+    'error_span', 'update_rate', 'diagnose_every', 'diagnose_span', 'frame_id',
+    'encoder_resolution', 'effort_noise', 'bandwidth', 'damping_ratio', 'hidden_effects',
+    'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale', 'limit_policy',
+    'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning', 'action',
+    'controller_timeout', 'demo', 'max_ahead', 'max_duration', 'ramp_time', 'stop_time',
+    'feedforward', 'tf_prefix', 'use_sim_time', 'start_type_description_service'})
+NODE_PREFIXES = ('qos_overrides.',)
 
 
 @dataclass(frozen=True)
@@ -158,15 +182,6 @@ KEYS: dict[str, Key] = {key.name: key for key in (
         upper=0.5, default=0.05),
 )}
 
-# Units of recorded efforts, and what they are in N m or N; amperes are multiplied by the gain.
-EFFORT_UNITS = {'N m': 1.0, 'N': 1.0, 'A': 1.0, 'mN m': 1e-3, 'mN': 1e-3, 'kN m': 1e3, 'kN': 1e3,
-                'N cm': 1e-2, 'kgf cm': 0.0980665, 'kgf m': 9.80665, 'kgf': 9.80665,
-                'lbf in': 0.1129848290276167}
-ROBOT = 'robot'  # block that describes a mechanism
-DRIVES_KEY, GAIN, LOCKED = 'robot.drives', 'robot.gain', 'robot.locked.'
-FILES = ('robot.urdf', 'robot.mjcf')  # keys that hold paths
-LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
-
 
 @cache
 def mechanism_keys(count: int) -> dict[str, Key]:
@@ -233,8 +248,6 @@ OF_JOINT = {
     'torque': Key('', 'dry friction, whatever the load', 'N m, N', lower=0, default=0.0),
     'coulomb': Key('', 'dry friction over the load across the axis', '', lower=0, default=0.0),
     'radius': Key('', 'radius at which it acts; of a slide 1', 'm', lower=0, default=0.0)}
-POSE = '_pose'
-JOINTS, MOTORS, HOME = 'friction.joints.', 'friction.motors.', 'robot.home.'
 # A key for each name that the file gives, or the keys of a block for each.
 NAMED: dict[str, Key | dict[str, Key]] = {
     'robot.loops.': OF_LOOP, JOINTS: OF_JOINT,
@@ -258,11 +271,6 @@ def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
             found.update((f'{block}.{last}', replace(key, name=f'{block}.{last}'))
                          for last, key in keys.items())
     return found
-
-
-# Blocks whose keys are not listed one by one.
-ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
-         'columns.', 'effort_kind', 'reference')
 
 
 def is_described(names: Iterable[str]) -> bool:
@@ -291,21 +299,6 @@ def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
 
 # Names of all keys of the model, of whatever kind.
 NAMES = frozenset({*KEYS, *mechanism_keys(1)})
-
-
-# Keys of ROS 2 itself and of single nodes, which may stand in the same file.
-NODE_KEYS = frozenset({
-    'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
-    'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
-    'window', 'error_span', 'update_rate', 'diagnose_every', 'diagnose_span', 'frame_id',
-    'encoder_resolution', 'effort_noise',
-    'bandwidth', 'damping_ratio',
-    'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
-    'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
-    'action', 'controller_timeout', 'demo', 'max_ahead', 'max_duration', 'ramp_time',
-    'stop_time', 'feedforward', 'tf_prefix',
-    'use_sim_time', 'start_type_description_service'})
-NODE_PREFIXES = ('qos_overrides.',)
 
 
 def below(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:

@@ -36,6 +36,10 @@ REFERENCE = 'reference'
 HASHES = 'reference_sha256'
 REFERENCE_KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
         HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
+UNCERTAINTIES = 'uncertainties'
+# Keys of the block `effects` that are no effect.
+ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
+LISTS = (ACTIVE.name, 'effects.measured')
 
 
 class ReferenceFile(NamedTuple):
@@ -72,9 +76,6 @@ def check_reference(parameters: Mapping[str, Any]) -> None:
                          f'have a SHA-256 each under {HASHES}: pprs fit writes both')
 
 
-UNCERTAINTIES = 'uncertainties'
-
-
 def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, float]:
     """Return the standard deviation of each parameter of an effect, by drive.parameter.
 
@@ -98,11 +99,6 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
             raise ModelError(key, value, f'belong to effects.{name}.{".".join(rest)}, which is '
                              'not there: take the line out')
         Key(key, 'a standard deviation', lower=0).check(value)
-
-
-# Keys of the block `effects` that are no effect.
-ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
-LISTS = (ACTIVE.name, 'effects.measured')
 
 
 def added_effects(

@@ -50,6 +50,13 @@ from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses
 from pprs_dynamics.system.package_files import located
 
 STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
+# Joints whose motors do not move one joint each.
+COUPLED = ('differential', 'fourbar')
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
+# Elements of an inertia tensor: as files have them, and as `Mechanism` has them.
+OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
+FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
+TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
 def read_platform(values: Mapping[str, Any],
@@ -85,15 +92,6 @@ def _reversal_widths(values: Mapping[str, Any]) -> tuple[float, ...]:
     """Return the width in which friction of each drive turns over."""
     return tuple(own or values['friction.reversal_velocity']
                  for own in values['friction.reversal_velocities'])
-
-
-# Joints whose motors do not move one joint each.
-COUPLED = ('differential', 'fourbar')
-STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
-# Elements of an inertia tensor: as files have them, and as `Mechanism` has them.
-OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
-FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
-TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
 def read_mechanism(values: dict[str, Any], folder: Path,

@@ -226,12 +226,12 @@ def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
     p, t = read_parameters(parameters), elements(Tables(motion, load, parts))
     first = -1
     for s in range(len(motion)):
-        if not _is_sound(p, s, t.motion, t.load, t.parts) and first < 0:
+        if not _is_regular(p, s, t.motion, t.load, t.parts) and first < 0:
             first = s
     return first
 
 
-def _is_sound(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
+def _is_regular(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
     """Fill in sample s and return whether it is within reach and far from a singularity."""
     m = motion_sample(motion, s)
     chains = chain_motions(p, m)

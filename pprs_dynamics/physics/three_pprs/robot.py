@@ -49,6 +49,13 @@ from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
 from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Joints
 
+HOME_HEIGHT = 0.5  # [m], of the platform at home
+SPHERICAL, RODS = 'spherical', 'rods'  # the joints A_i, and the rods; C_i are REVOLUTE
+POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
+# The condition number of a long trajectory is computed at this many samples, evenly spread:
+# neighbours hardly differ, and a singular value decomposition costs more than the model.
+MOST_CONDITIONS = 64
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -144,7 +151,6 @@ def _require(key: str, value: Any, condition: bool, rule: str) -> None:
         raise ModelError(key, value, rule)
 
 
-HOME_HEIGHT = 0.5  # [m], of the platform at home
 UNLOADED = Masses(1.0, 0.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 6)
 
 
@@ -210,13 +216,6 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
                                 effort=float(effort))
     description = Description('', links, joints, '')
     return build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
-
-
-SPHERICAL, RODS = 'spherical', 'rods'  # the joints A_i, and the rods; C_i are REVOLUTE
-POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
-# The condition number of a long trajectory is computed at this many samples, evenly spread:
-# neighbours hardly differ, and a singular value decomposition costs more than the model.
-MOST_CONDITIONS = 64
 
 
 class SingularityBounds(NamedTuple):

@@ -22,6 +22,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 
+LAGS = 2
+# [s], tried: from cut-offs of 160 Hz to one of 1.6 Hz, beyond which no motion of a robot is left.
+SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
+
 
 def first_order(kept: Array | float, driven: Array, before: float) -> Array:
     """Return y_k = kept_k y_{k-1} + driven_k, (N,), from y_{-1} = before.
@@ -43,11 +47,6 @@ def first_order(kept: Array | float, driven: Array, before: float) -> Array:
     bands[1, :-1] = -np.asarray(kept)
     found: Array = dtbsv(1, bands, np.concatenate(([before], driven)), lower=1, diag=1)
     return found[1:]
-
-
-LAGS = 2
-# [s], tried: from cut-offs of 160 Hz to one of 1.6 Hz, beyond which no motion of a robot is left.
-SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
 
 
 class EffortFilter(MeasurementEffect):

@@ -80,13 +80,13 @@ class ElasticJoint(MeasurementEffect):
             if k < 0 or not np.any(w := windup[:, :, k]):
                 continue
             load = transmitted[:, k]
-            stiffness, _, said = told_by_windup(load, w)
+            stiffness, _, said = load_by_windup(load, w)
             error[0, :, k] = values['compliance'] * (said - load) - values['loss'] * w[1]
             error[2, :, k] = values['compliance'] * stiffness * w[2]
         return error
 
 
-def told_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
+def load_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
     """Return stiffness, damping, and the load that a second encoder shows, (N,).
 
     Parameters
