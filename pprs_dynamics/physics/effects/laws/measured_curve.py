@@ -122,10 +122,9 @@ class MeasuredCurve(DriveEffect):
     variants = ((),)
 
     def __init__(self, drives: Mapping[str, Mapping[str, Any]]) -> None:
-        super().__init__({drive: dict(values) for drive, values in drives.items()})
-        self.curves = {drive: Curve(
-            values['variable'], values['from'], values['to'], tuple(values['values']),
-            values['periodic']) for drive, values in drives.items()}
+        super().__init__(drives)
+        self.curves = {drive: Curve(*(values[key] for key in RULES))
+                       for drive, values in drives.items()}
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
@@ -205,7 +204,7 @@ def _are_values(value: Any) -> bool:
             and all(map(_is_number, value)))
 
 
-# Whether a value of a key is right, and what it must be.
+# Whether a value of a key is right, and what it must be, in the order of `Curve`.
 RULES: dict[str, tuple[Callable[[Any], bool], str]] = {
     'variable': (_is_variable, f'be one of {", ".join(OWN)}, or '
                  + ' or '.join(f'{name} of DRIVE' for name in OF)),
