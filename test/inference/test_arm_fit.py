@@ -115,7 +115,7 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
     described = DriveModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
     fit = fit_base(described, [arm.record(real, still, NOISE)])
     assert fit.model.values['friction.viscous'][2] == 33.0
-    assert any('reach hardly moves' in sentence for sentence in fit.notes)
+    assert any('joints that hardly move: reach' in sentence for sentence in fit.notes)
 
 
 def test_fitted_links_are_bodies(tmp_path: Path) -> None:
@@ -199,8 +199,8 @@ def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
         assert main(['fit', str(tmp_path / f'{fitted}.csv'), '--model', model, '--output',
                      base]) == 0
         said = capsys.readouterr().out
-        assert f'{weight:.4g} kg in the description' in said
-        assert 'is part of the model now' in said
+        assert f'{weight:.3g} kg in the description' in said
+        assert 'is now part of the model' in said
         told = tmp_path / 'told.json'
         assert main(['diagnose', str(tmp_path / 'loaded.csv'), '--model', base, '--json',
                      str(told)]) == 0

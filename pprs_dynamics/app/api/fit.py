@@ -17,7 +17,12 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.inference.diagnosis.quantities import plain, sentence, word_little
+from pprs_dynamics.inference.diagnosis.quantities import (
+    plain,
+    sentence,
+    with_uncertainty,
+    word_little,
+)
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -82,17 +87,18 @@ class FitResult(Result):
 
     @property
     def _numbers(self) -> PlainTable:
-        return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
-            (number.key, number.drive, plain(number.before), plain(number.after),
-             plain(2 * number.std) if isfinite(number.std) else '', number.unit)
-            for number in self.fit.numbers]
+        return ('number', 'drive', 'before', 'after, ± two standard deviations'), [
+            (number.key, number.drive,
+             with_uncertainty(number.before, 0.0, number.unit, abs(number.after)),
+             with_uncertainty(number.after, number.std if isfinite(number.std) else 0.0,
+                              number.unit)) for number in self.fit.numbers]
 
     def view(self) -> Any:
         """Return errors and notes for the terminal; the page has every number."""
-        errors = text_table(*plain_rows(self._errors), right=(2, 3, 4),
-                            title=f'Error, rms; held out: {HELD_OUT[self.fit.held_out_on]}')
-        return stacked(*filter(None, [escape(self._headline)]), errors,
-                       *map(escape, self.fit.notes))
+        errors = text_table(*plain_rows(self._errors), right=(2, 3, 4))
+        return stacked(*filter(None, [escape(self._headline)]),
+                       f'Error, rms. Held out: {HELD_OUT[self.fit.held_out_on]}.', errors,
+                       *(escape(sentence(note)) for note in self.fit.notes))
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""

@@ -107,7 +107,9 @@ class Inputs:
         else:
             held_out = () if isinstance(validate, Inputs) else validate
             found = replace(cls.read(model, recordings, held_out, topic, progress),
-                            as_it_is=as_it_is).checked()
+                            as_it_is=as_it_is)
+            stage(progress, 'checking units and signs')(0.0)
+            found = found.checked()
         return found if whole else found.within_memory()
 
     @classmethod

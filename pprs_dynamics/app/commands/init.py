@@ -14,6 +14,7 @@ from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
 from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
+from pprs_dynamics.inference.diagnosis.next_step import SECOND
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -65,9 +66,9 @@ def run(options: argparse.Namespace) -> int:
     if first.has_efforts:
         screen.print('[bold]Next[/] Fit the model, then diagnose another run:')
         screen.print(shell_command(f'pprs fit {names} --model {file} --output base.yaml'))
-        screen.print(shell_command(f'pprs diagnose {names} --model base.yaml'))
-        screen.print('A fault of the robot becomes part of the model that is fitted to it: fit a '
-                     'healthy run without load, and diagnose another one.')
+        screen.print(shell_command(f'pprs diagnose {SECOND} --model base.yaml'))
+        screen.print('Fit a healthy run without load: a fault in the fitted run becomes part of '
+                     'the model, and cannot be found later.')
     else:
         screen.print('[bold]Next[/] See what the recording contains:')
         screen.print(shell_command(f'pprs info {names} --model {file}'))

@@ -18,6 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
@@ -243,7 +244,7 @@ def _bar(kind: str, share: float) -> str:
 
 
 def _force(value: float | None) -> str:
-    return '' if value is None or value != value else f'{value:.3f}'
+    return '' if value is None or value != value else plain(value)
 
 
 @cache

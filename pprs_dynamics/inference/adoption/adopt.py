@@ -183,8 +183,10 @@ class _Case:
             return (said,)
         if gain.confirms(asked):
             return ()
-        why = (f'on {listed(gain.losing)} it rises for certain' if gain.losing else
-               f'the fall is {gain.certainty:.2g} standard errors, must be more than {asked:g}')
+        sure = gain.certainty
+        why = (f'on {listed(gain.losing)} it certainly rises' if gain.losing else
+               f'weighted by the noise it rises by {-sure:.2g} standard errors' if sure < 0 else
+               f'the fall is {sure:.2g} standard errors, and more than {asked:g} are required')
         return (f'{said}; {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
@@ -405,10 +407,10 @@ def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
     more = f'the set with {request.name} costs {plain(row.cost - table.best.cost, 2)} more'
     for first in case.diagnosis.effects:
         on = f' on {listed(first.drives)}' if first.drives else ''
-        return (f'{first.name}{on} explains these recordings better: {more}',)
+        return (f'{first.name}{on} explains these recordings better ({more})',)
     if request.present(case.model):
         return (f'{request.name} is in the model already, and the recordings support no other '
-                f'values: {more}',)
+                f'values ({more})',)
     return (f'the recordings do not support {request.name}: {more} than the model without it',)
 
 

@@ -232,15 +232,16 @@ def _notes(model: DriveModel, fitted: DriveModel, links: Array, masses: Array, s
     determined = int(np.sum(np.linalg.eigvalsh(links) < DETERMINED ** 2))
     weak = np.einsum('kp,pq,kq->k', masses, links, masses) > (
         DETERMINED ** 2 * np.sum(masses ** 2, axis=1))
-    notes = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
+    notes = [f'the mass of all links together is {after:.3g} kg, and {before:.3g} kg in the '
+             'description',
              f'the motion determines {determined} of the {len(links)} inertial parameters of the '
-             'links, or combinations of them; all others stay near those of the URDF']
+             'links, or combinations of them; the others stay near those of the description']
     if weak.any():
-        notes.append('it does not determine the masses of the links that '
-                     f'{", ".join(np.array(model.robot.body_joints)[weak])} move one by one')
+        notes.append('the motion does not determine the single masses of the links at '
+                     f'{", ".join(np.array(model.robot.body_joints)[weak])}')
     if still.any():
-        notes.append(f'{", ".join(np.array(model.drives)[still])} hardly moves: its friction stays '
-                     'as it was')
+        notes.append(f'friction stays as it was on joints that hardly move: '
+                     f'{", ".join(np.array(model.drives)[still])}')
     if model.efforts_in_amperes:
         notes.append('efforts are currents times robot.gain: a gain that is wrong by 1 % makes all '
                      'numbers wrong by 1 %')

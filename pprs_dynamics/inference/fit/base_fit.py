@@ -30,8 +30,8 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import for_json
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
-PART_OF_IT = ('what was wrong with the robot in these runs is part of the model now: fit healthy '
-              'runs without load, and diagnose others')
+PART_OF_IT = ('a fault of the robot in these runs is now part of the model. Fit healthy runs '
+              'without load, and diagnose other runs')
 
 
 class FitError(PprsError, ValueError):
