@@ -58,8 +58,10 @@ MOST_REMARKS = 2
 def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
     """Return each parameter that is not 0, and its value ± two standard deviations.
 
-    With first moments of bodies that are sure where the mass is not.
+    With first moments of bodies that are sure where the mass is not. A curve has a picture.
     """
+    if answer.curve is not None:
+        return []
     effect = answer.request.effect
     scales = {parameter.name: parameter.scale for parameter in effect.parameters}
     rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
@@ -127,7 +129,8 @@ class AdoptionResult(Result):
     def headline(self) -> str:
         """The answer in a sentence."""
         answer = self.adoption
-        what = with_drives(answer.effect, answer.drives, answer.before.drives)
+        what = answer.effect if answer.curve is not None else with_drives(
+            answer.effect, answer.drives, answer.before.drives)
         said = ('is refused' if not answer.adopted else
                 'is adopted by force, in spite of this' if answer.forced else 'is adopted')
         return f'{what} {said}: {answer.reason}.'
@@ -187,8 +190,8 @@ class AdoptionResult(Result):
             page.command('Look for further effects', replace(
                 self.inputs.files, model=saved_as).command('diagnose', held_out=True))
         page.bullets(answer.remarks)
-        if answer.parameters:
-            page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
+        if rows := parameter_rows(answer):
+            page.table(('parameter', 'value ± two standard deviations'), rows,
                        caption='Fitted values')
         forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
                   if isinstance(effect, CatalogueEffect) and effect.name in after.parts}

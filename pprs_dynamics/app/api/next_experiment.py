@@ -109,7 +109,7 @@ class ExperimentResult(Result):
     def _accuracies(self) -> PlainTable:
         """Numbers with their standard deviations, before and after."""
         def number(value: float) -> str:
-            return 'unknown' if value == float('inf') else f'{value:.3g}'
+            return 'unknown' if value == float('inf') else f'{value:.2g}'
         return ('parameter', 'std now', 'std after', 'relevant from', 'unit'), [
             (accuracy.label, number(accuracy.std_before), number(accuracy.std_after),
              f'{accuracy.scale:.3g}', accuracy.unit)

@@ -74,8 +74,8 @@ def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
     screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
         ('drive', 'effort', 'error'),
-        [(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
+        [(shown(name), *(f'{number:.3g} {unit}' for number in numbers))
          for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
                                          strict=True)]))
     more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
-    screen.print(f'not expressed: {shown(", ".join(left[:FEW]) or "nothing")}{more}')
+    screen.print(f'Not expressed in the file: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

@@ -28,6 +28,7 @@ from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import change, listed, plain
+from pprs_dynamics.inference.diagnosis.statements import in_words, read_in
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms
@@ -435,13 +436,15 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
     against = () if evidence > 0 else (
         f'the recordings support no curve over {request.variable} on {drive}: evidence '
         f'{evidence:.3g} (threshold 0)',)
-    remarks = [f'A measured curve is no cause: {fitted.freedom:.0f} degrees of freedom over '
-               f'{request.variable} from {fitted.curve.start:.4g} to {fitted.curve.end:.4g}; '
-               'beyond that range it is constant']
+    factor, unit = read_in(request.variable, start.units_of(drive))
+    low, high = (plain(factor * end) for end in (fitted.curve.start, fitted.curve.end))
+    remarks = ['A measured curve is a correction table, not a cause. It has '
+               f'{fitted.freedom:.0f} degrees of freedom over {in_words(request.variable)} from '
+               f'{low} to {high} {unit}, and is constant beyond']
     if case.diagnosis.effects:
         others = listed([effect.name for effect in case.diagnosis.effects])
-        remarks.append(f'The recordings also show {others}: adopt causes first, a curve in their '
-                       'place is valid for this motion only')
+        remarks.append(f'The recordings also show {others}: adopt causes first. A curve in '
+                       'their place is valid for this motion only')
     return case.adoption(
         request, after, case.residuals(case.recordings, model, after), (rms(given), rms(found)),
         predictive_gain(given, found), against,

@@ -31,7 +31,8 @@ def with_uncertainty(value: float, std: float, unit: str, size: float | None = N
         return f'{plain(value, 4)}{name}'
     decimals = 1 - floor(log10(spread))
     digits = max(decimals, 0)
-    return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
+    rounded = round(value, decimals) or 0.0  # no -0.0
+    return f'{rounded:.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
 
 
 def in_fitting_unit(values: Sequence[float], unit: str, digits: int = 2) -> str:

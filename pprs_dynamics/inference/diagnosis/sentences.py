@@ -56,6 +56,7 @@ MOSTLY = 0.95  # of a recording, from which on a reference covers its states
 # of up to 70 ms that it has not; a program repeats its own speeds to hundredths.
 ALIKE_PACE = 1.25
 COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')  # named as detectable
+LEAST_SHARE = 0.005  # of an error, which is printed as 1 %
 MOST_PLACES = 2  # of an unexplained error in the headline
 MOST_SHARED = 2  # effects of the best set that another one of the table repeats
 LEAST_REFIT = 0.01  # share of the error by which refitted numbers matter
@@ -150,9 +151,12 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         As `rival_effects` returns them.
     """
     following, command = next_step(diagnosis, files)
-    since = f'Since {listed(diagnosis.since.recordings)}: ' if diagnosis.since else ''
+    headline = _headline(diagnosis)
+    if diagnosis.since:
+        headline = (f'Since {listed(diagnosis.since.recordings)}: '
+                    f'{headline[:1].lower()}{headline[1:]}')
     return Sentences(
-        since + _headline(diagnosis),
+        headline,
         tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
@@ -279,10 +283,11 @@ def word_reference(since: SinceReference | None) -> tuple[str, ...]:
     """Return what a reference run covers and explains; nothing without one."""
     if since is None:
         return ()
-    shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
+    shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()
+                     if share >= LEAST_SHARE]) or 'nothing'
     words = [f'{listed(since.recordings)} covers {since.covered:.0%} of the states of this '
              'recording' + ('' if since.covered > MOSTLY else '; elsewhere only the model is known')
-             + f'. It explains this share of the squared error: {shares}',
+             + f'. Of the squared error it explains {shares}',
              'a fault that was already in the reference cannot be seen']
     if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
         words.append(f'this recording moves at {since.pace:.2g} times the speed of the reference: '

@@ -221,8 +221,8 @@ class Motions:
         except PprsError as error:
             reason = str(error)
         raise NoMotionError('no motion is allowed: at rest in the middle of its workspace the '
-                            f'robot is beyond {reason} already; the limits, with their margin, '
-                            'must leave room')
+                            f'robot already exceeds its limit of {reason}, less the margin; '
+                            'raise the limits in the model file')
 
     def sampled(self, series: JointSeries, time: Array) -> PlatformMotion | JointMotion:
         """Return the motion of a series at times [s]."""

@@ -172,19 +172,19 @@ class Experiment:
     def text(self) -> str:
         """What it is for, and whether it will do, in a few sentences."""
         if self.determined is not None:
-            return ('This motion measures the numbers of the model and shows all common effects. '
-                    f'It determines {self.determined[0]} of {self.determined[1]} combinations of '
-                    'them better than the size at which they matter. Collisions are not checked.')
+            return ('This motion measures the numbers of the model and of common effects. It '
+                    f'determines {self.determined[0]} of {self.determined[1]} combinations better '
+                    'than the size at which they matter. Collisions are not checked.')
         if self.kind == ESTIMATE:
-            return (f'One explanation is left: {", ".join(self.subjects)}. This motion measures '
-                    'its parameters best.')
+            return (f'Only one explanation remains: {", ".join(self.subjects)}. This motion '
+                    'measures its parameters best.')
         found = []
         if self.separates:
-            found.append(f'This motion separates {_listed(self.separates)}: evidence of '
-                         f'{self.expected_evidence:.0f} is expected.')
+            found.append(f'This motion separates {_listed(self.separates)}. The expected evidence '
+                         f'is {self.expected_evidence:.0f} (10 are odds of 150 to 1).')
         if self.fails:
-            found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
-                         'tried within these limits does so for sure.')
+            found.append(f'It hardly separates {_listed(self.fails)}: no motion within the limits '
+                         'was found that does.')
         if self.load:
             found.append(f'For {_listed(self.separated_by_load)} record the same motion once more '
                          f'with {self.load:g} kg more at the tool, and diagnose that recording '
