@@ -172,7 +172,7 @@ def first_mass(found: dict[str, Any]) -> dict[str, float] | None:
     return first['parameters']['mass'] if first and first['name'] == 'payload_mass' else None
 
 
-def told(mass: dict[str, float]) -> str:
+def worded(mass: dict[str, float]) -> str:
     """Return a mass and its interval."""
     return f'{mass["value"]:.3f} ± {2 * mass["std"]:.3f} kg'
 
@@ -205,7 +205,7 @@ def load_rows(bench: Bench) -> tuple[list[list[str]], int, int, int]:
             first += 1
             near += abs(mass['value'] / MASS - 1) < 0.03
             held += holds(mass)
-            rows[-1].append(told(mass))
+            rows[-1].append(worded(mass))
     return rows, first, near, held
 
 
@@ -240,7 +240,7 @@ def draw(path: Path, drives: Sequence[str], curves: dict[str, Any], ylabel: str)
 
 
 def pictures(bench: Bench) -> None:
-    """Draw the base model on a run that it never saw, and the loaded run with what was found."""
+    """Draw errors of the base model on a run that was not fitted, and on the loaded run."""
     described, base, found = (DriveModel.load(bench.folder / f'{name}.yaml')
                               for name in ('arm', 'base', 'loaded'))
     curves = {}
@@ -253,11 +253,11 @@ def pictures(bench: Bench) -> None:
     run = read_recording(bench.folder / file(LOADED), base.recorded)
     curves = {}
     for label, model, colour in (('base model', base, '#D55E00'),
-                                 ('with the payload that was found', found, '#009E73')):
+                                 ('with the reported payload', found, '#009E73')):
         residuals, _ = measure_residuals(model, [run])
         curves[label] = residuals.time - residuals.time[0], residuals.error, colour
     draw(DOCS / 'images/arms_load.png', base.drives, curves,
-         'measured minus model [N m], with a load that the model was not told of')
+         'measured minus model [N m], with a load that the base model does not contain')
 
 
 def tell(bench: Bench) -> dict[str, str]:
@@ -275,7 +275,6 @@ def tell(bench: Bench) -> dict[str, str]:
     hand = bench.run('hand', 'diagnose', file(HELD_OUT), '--model', 'hand.yaml')
     zeros, right, first_named = zero_rows(bench, base)
     bench.run('better', 'diagnose', file(FURTHER), '--model', 'base.yaml', '--adopt-all',
-              '--refit', *(file(name) for name in FITTED if name != GATE),
               '--output', 'better.yaml', '--validate', file(GATE))
     before, after = (bench.run(f'on_{name}', 'compare', file(HELD_OUT), '--model',
                                f'{name}.yaml') for name in ('base', 'better'))
@@ -296,7 +295,7 @@ def tell(bench: Bench) -> dict[str, str]:
     first = load['effects'][0]['name'] if load['effects'] else 'nothing'
     seconds = sorted(outcome['processor_seconds'] for outcome in (load, free) if outcome)
     value = 'none' if mass is None else (
-        f'{told(mass)} ({100 * (mass["value"] / MASS - 1):+.1f} %, '
+        f'{worded(mass)} ({100 * (mass["value"] / MASS - 1):+.1f} %, '
         f'{"holds" if holds(mass) else "does not hold"} {MASS} kg)')
     taken = first_mass(hand)
     without_hand = ', '.join(effect['name'] for effect in hand.get('effects', ())) or 'not measured'
@@ -307,10 +306,10 @@ def tell(bench: Bench) -> dict[str, str]:
          f'{load_first} of {count} first, {load_near} within 3 %, {load_held} hold it'],
         [f'a hand of {HAND} kg in the model that is not there: first, within 5 %, no zeros', 'yes',
          without_hand if taken is None else
-         f'first; {told(taken)}; all: {without_hand}'],
+         f'first; {worded(taken)}; all: {without_hand}'],
         ['free run: payload or gain claimed', 'none', ', '.join(sorted(claimed)) or 'none'],
         ['base model on a run not fitted, joints within the goal', '6 of 6', f'{met} of 6'],
-        ['the same after `--adopt-all --refit` on another free run, error over all joints',
+        ['the same after `--adopt-all` on another free run, error over all joints',
          '≥ 35 % lower', fall],
         ['one number of friction set to 0: named first, value within 15 %', '≥ 11 of 12',
          f'{right} of {len(zeros)}; {first_named} named first with any value'],
