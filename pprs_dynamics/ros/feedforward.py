@@ -256,9 +256,8 @@ class FeedforwardNode(ManagedNode):
         elif self._beyond_curve:
             report('WARN', 'CURVE', self._beyond_curve)
         elif self._lagging:
-            report('WARN', 'LAG', 'messages wait longer than lag_warning at the median, or most '
-                   'are passed over: they come faster than they are answered, or the '
-                   'machine is busy')
+            report('WARN', 'LAG', 'the median wait of messages exceeds lag_warning, or most are '
+                   'dropped: they arrive faster than the node answers, or the machine is busy')
         else:
             report('OK', 'OK', 'commands follow the trajectory')
 

@@ -250,8 +250,8 @@ class MonitorNode(ManagedNode):
         elif self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
         elif different := self._owner.difference():
-            self._status.report('WARN', 'MODEL', f'{different}: what is compared is not what '
-                                f'drives; {text}')
+            self._status.report('WARN', 'MODEL', f'{different}: the monitor compares another '
+                                f'model than the one in force; {text}')
         else:
             self._status.report('OK', 'OK', text)
 

@@ -9,23 +9,23 @@ const ABOUT = [['', 'equation'], ['Looks like: ', 'looks_like'], ['Caused by: ',
 const EVIDENCE = 'evidence: 0 is the threshold, 10 are odds of 150 to 1';
 
 /* A slider is a factor of ten either way, or as much as matters where there is a sign. */
-export const fromSlider = (one, middle, at) => {
-  const value = one.is_relative ? middle * 10 ** (at / 100)
-    : middle + at / 100 * Math.max(Math.abs(middle), one.scale);
-  return Math.min(one.upper, Math.max(one.lower, value));
+export const fromSlider = (parameter, middle, at) => {
+  const value = parameter.is_relative ? middle * 10 ** (at / 100)
+    : middle + at / 100 * Math.max(Math.abs(middle), parameter.scale);
+  return Math.min(parameter.upper, Math.max(parameter.lower, value));
 };
-export const toSlider = (one, middle) => (one.value === null ? 0 : Math.round(100 * (
-  one.is_relative ? Math.log10(one.value / middle)
-    : (one.value - middle) / Math.max(Math.abs(middle), one.scale))));
+export const toSlider = (parameter, middle) => (parameter.value === null ? 0 : Math.round(100 * (
+  parameter.is_relative ? Math.log10(parameter.value / middle)
+    : (parameter.value - middle) / Math.max(Math.abs(middle), parameter.scale))));
 
 /* Whether the evidence supports an effect. Once there is a diagnosis, an effect that it does not
    report is supported only if it is ticked: the scan ignores how friction reverses. */
-export const pays = (one) => one.evidence > 0
-  && (one.is_ticked || one.is_called_for || !one.is_judged);
+export const pays = (effect) => effect.evidence > 0
+  && (effect.is_ticked || effect.is_called_for || !effect.is_judged);
 
 /* What is ticked first, then what the diagnosis names, then by evidence. */
-const score = (one) => (one.is_ticked ? 1e12 : 0) + (one.is_called_for ? 1e11 : 0)
-  + (one.evidence ?? -1e9);
+const score = (effect) => (effect.is_ticked ? 1e12 : 0) + (effect.is_called_for ? 1e11 : 0)
+  + (effect.evidence ?? -1e9);
 export const ordered = (effects) => [...effects].sort((a, b) => score(b) - score(a));
 
 class EffectRow {
@@ -89,7 +89,7 @@ class EffectRow {
     this.bar.hidden = this.chips.hidden = this.parameters.hidden = !effect.is_ticked;
     if (!effect.is_ticked) return;
     this.adopt.disabled = Boolean(state.jobs.adopt?.is_running);
-    this.release.hidden = !effect.parameters.some((one) => one.is_chosen);
+    this.release.hidden = !effect.parameters.some((parameter) => parameter.is_chosen);
     if (effect.is_on_drives) this.showDrives(effect.drives ?? [], state.drives);
     this.showParameters(effect.parameters);
   }
@@ -109,48 +109,48 @@ class EffectRow {
   }
 
   showParameters(parameters) {
-    const keys = parameters.map((one) => one.key).join();
+    const keys = parameters.map((parameter) => parameter.key).join();
     if (this.keys !== keys) {
       this.keys = keys;
       this.fields.clear();
-      this.parameters.replaceChildren(...parameters.map((one) => this.field(one)));
+      this.parameters.replaceChildren(...parameters.map((parameter) => this.field(parameter)));
     }
-    for (const one of parameters) {
-      const {line, input, range, after} = this.fields.get(one.key);
-      line.classList.toggle('chosen', one.is_chosen);
+    for (const parameter of parameters) {
+      const {line, input, range, after} = this.fields.get(parameter.key);
+      line.classList.toggle('chosen', parameter.is_chosen);
       if (document.activeElement !== input) {
-        input.value = one.value === null ? '' : digits(one.value, one.std && 2 * one.std);
+        input.value = parameter.value === null ? '' : digits(parameter.value, parameter.std && 2 * parameter.std);
       }
-      after.textContent = `${one.is_chosen ? '' : one.std === null ? '± … '
-        : `± ${(2 * one.std).toPrecision(2)} `}${one.unit === '1' ? '' : one.unit}`;
+      after.textContent = `${parameter.is_chosen ? '' : parameter.std === null ? '± … '
+        : `± ${(2 * parameter.std).toPrecision(2)} `}${parameter.unit === '1' ? '' : parameter.unit}`;
       if (range && document.activeElement !== range) {
-        if (!one.is_chosen) range.dataset.middle = one.value;
-        range.value = toSlider(one, Number(range.dataset.middle ?? one.value));
+        if (!parameter.is_chosen) range.dataset.middle = parameter.value;
+        range.value = toSlider(parameter, Number(range.dataset.middle ?? parameter.value));
       }
     }
   }
 
-  field(one) {
+  field(parameter) {
     const line = make('div', '', 'parameter');
-    const input = make('input', '', '', {type: 'number', step: 'any', id: `${this.name}-${one.key}`});
-    const label = make('label', one.key, '', {htmlFor: input.id,
-                                              title: `${one.symbol}: ${one.description}`});
+    const input = make('input', '', '', {type: 'number', step: 'any', id: `${this.name}-${parameter.key}`});
+    const label = make('label', parameter.key, '', {htmlFor: input.id,
+                                              title: `${parameter.symbol}: ${parameter.description}`});
     const after = make('span', '', 'quiet');
     line.append(label, input, after);
     input.addEventListener('change', (event) => {
       if (input.value !== '') {
-        this.actions.choose(this.name, one.key, Number(input.value), event.timeStamp);
+        this.actions.choose(this.name, parameter.key, Number(input.value), event.timeStamp);
       }
     });
     let range;
-    if (one.is_shape) {
+    if (parameter.is_shape) {
       range = make('input', '', '', {type: 'range', min: -100, max: 100, step: 1});
-      range.setAttribute('aria-label', `${titleOf(this.name)}, ${one.key}: drag its shape`);
-      range.addEventListener('input', (event) => this.drag(one.key, fromSlider(
-        one, Number(range.dataset.middle), Number(range.value)), event.timeStamp));
+      range.setAttribute('aria-label', `${titleOf(this.name)}, ${parameter.key}: drag its shape`);
+      range.addEventListener('input', (event) => this.drag(parameter.key, fromSlider(
+        parameter, Number(range.dataset.middle), Number(range.value)), event.timeStamp));
       line.append(range);
     }
-    this.fields.set(one.key, {line, input, range, after});
+    this.fields.set(parameter.key, {line, input, range, after});
     return line;
   }
 
@@ -184,7 +184,7 @@ export class EffectList {
     }
     // Rows stay where they are under a hand.
     const isBusy = this.root.matches(':hover') || this.root.contains(document.activeElement);
-    const names = ordered(state.effects).map((one) => one.name);
+    const names = ordered(state.effects).map((effect) => effect.name);
     if (this.root.children.length !== names.length
         || (!isBusy && state.is_settled && names.join() !== this.order)) {
       this.order = names.join();

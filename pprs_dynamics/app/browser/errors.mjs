@@ -30,19 +30,19 @@ const bars = (canvas, {before, now, noise}, most) => {
 
 export const showErrors = (root, state) => {
   const entries = Object.entries(state.errors);
-  const most = Math.max(...entries.map(([, one]) => Math.max(one.before, one.now)), 1e-9);
+  const most = Math.max(...entries.map(([, drive]) => Math.max(drive.before, drive.now)), 1e-9);
   if (root.children.length !== entries.length) {
     root.replaceChildren(...entries.map(([name]) => tile(name)));
   }
-  entries.forEach(([name, one], k) => {
+  entries.forEach(([name, drive], k) => {
     const [, canvas, figures] = root.children[k].children;
-    const [before, now, noise] = [one.before, one.now, one.noise].map(amount);
+    const [before, now, noise] = [drive.before, drive.now, drive.noise].map(amount);
     const unit = unitOf(state, name);
-    root.children[k].querySelector('.fall').textContent = change(one.before, one.now);
+    root.children[k].querySelector('.fall').textContent = change(drive.before, drive.now);
     root.children[k].querySelector('.name span').textContent = unit ? `${name} [${unit}]` : name;
     figures.replaceChildren(`${before} → `, make('span', now, 'now'),
-                            one.noise === null ? '' : ` → noise ${noise}`);
-    bars(canvas, one, most);
+                            drive.noise === null ? '' : ` → noise ${noise}`);
+    bars(canvas, drive, most);
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label',
                         `${name}: ${before} before, ${now} now, noise ${noise} ${unit}`);

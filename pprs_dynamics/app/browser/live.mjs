@@ -25,7 +25,7 @@ export const sentence = (found, unit) => {
 /* What the monitor's live diagnosis says of the robot, `null` where it is not asked for one. */
 export const changesSaid = (diagnosis) => {
   if (!diagnosis) return '';
-  const gone = (diagnosis.withdrawn ?? []).map((one) => titleOf(one.name)).join(', ');
+  const gone = (diagnosis.withdrawn ?? []).map((effect) => titleOf(effect.name)).join(', ');
   return [diagnosis.text ? `What changed: ${diagnosis.text}` : 'Nothing has changed.',
           gone && `Gone: ${gone}.`, diagnosis.note].filter(Boolean).join(' ');
 };
@@ -37,7 +37,7 @@ export class Live {
     $('live-set').addEventListener('click', () => this.ask(
       'live/set', 'Set the ticked effects on this machine?', 'Set'));
     $('live-restore').addEventListener('click', () => this.ask(
-      'live/restore', 'Set this machine back to what it had?', 'Restore'));
+      'live/restore', 'Restore the previous model of this machine?', 'Restore'));
     $('live-no').addEventListener('click', () => $('live-confirm').close());
     $('live-yes').addEventListener('click', () => this.set());
     $('live-pause').addEventListener('click', () => { // what comes in meanwhile is kept
@@ -45,7 +45,7 @@ export class Live {
       $('live-pause').setAttribute('aria-pressed', String(this.isPaused));
     });
     $('live-take').addEventListener('click', () => server.run(
-      'live/take', {}, 'What came in last is a recording of this session now.'));
+      'live/take', {}, 'The last live data are now a recording of this session.'));
   }
 
   /* A person confirms the machine by its name: the robot that moves may not be the one meant. */
@@ -53,7 +53,7 @@ export class Live {
     try {
       const {machine} = await this.server.ask('live/machine');
       if (!machine) {
-        this.server.tell('No node runs that could be set.');
+        this.server.tell('No node that could be set is running.');
         return;
       }
       this.asked = {change, machine};

@@ -80,24 +80,24 @@
     cursor.className = 'cursor';
     cursor.hidden = true;
     plot.append(cursor);
-    const others = () => plots.filter((one) => one !== plot && one.dataset.time !== undefined
-                                      && one.dataset.drawn !== undefined);
+    const others = () => plots.filter((other) => other !== plot && other.dataset.time !== undefined
+                                      && other.dataset.drawn !== undefined);
     plot.on('plotly_relayout', (change) => {
       const key = Object.keys(change).find((name) => /^xaxis\d*\.(range(\[0\])?|autorange)$/.test(name));
       if (!key) return;
       const now = key.endsWith('autorange') ? null : [...plot.layout.xaxis.range];
       if (String(now) === String(span)) return;
       span = now;
-      for (const one of others()) {
-        Plotly.relayout(one, now ? {'xaxis.range': now} : {'xaxis.autorange': true});
+      for (const other of others()) {
+        Plotly.relayout(other, now ? {'xaxis.range': now} : {'xaxis.autorange': true});
       }
     });
     plot.on('plotly_hover', ({points}) => {
-      for (const one of [plot, ...others()]) {
-        const axis = one._fullLayout.xaxis;
-        const line = one.querySelector('.cursor');
+      for (const other of [plot, ...others()]) {
+        const axis = other._fullLayout.xaxis;
+        const line = other.querySelector('.cursor');
         line.style.left = `${axis._offset + axis.d2p(points[0].x)}px`;
-        line.hidden = one === plot;
+        line.hidden = other === plot;
       }
     });
     plot.on('plotly_unhover', () => {
@@ -107,7 +107,7 @@
 
   for (const menu of menus) {
     menu.addEventListener('change', async () => {
-      menus.forEach((one) => { one.value = menu.value; });
+      menus.forEach((other) => { other.value = menu.value; });
       const Plotly = await plotly();
       for (const plot of plots) {
         if (plot.dataset.drawn !== undefined && plot.data.some((trace) => trace.meta?.drive)) {
@@ -119,7 +119,7 @@
 
   dark.addEventListener('change', async () => {
     const Plotly = await plotly();
-    for (const plot of plots.filter((one) => one.dataset.drawn !== undefined)) {
+    for (const plot of plots.filter((drawn) => drawn.dataset.drawn !== undefined)) {
       const {data, layout} = contentOf(plot);
       Plotly.react(plot, data, layout);
     }
@@ -139,10 +139,10 @@
   }
 
   const seen = new IntersectionObserver((entries) => {
-    entries.filter((one) => one.isIntersecting).forEach((one) => {
-      seen.unobserve(one.target);
+    entries.filter((entry) => entry.isIntersecting).forEach((entry) => {
+      seen.unobserve(entry.target);
       // The text is painted first.
-      requestAnimationFrame(() => setTimeout(() => draw(one.target)));
+      requestAnimationFrame(() => setTimeout(() => draw(entry.target)));
     });
   }, {rootMargin: '200px'});
   plots.forEach((plot) => seen.observe(plot));

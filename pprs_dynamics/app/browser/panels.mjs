@@ -74,7 +74,7 @@ export const showStage = (state) => {
       state.departure < 10 ? 1 : 0)} against the best (10 are odds of 150 to 1).`, 'departure'));
   }
   if (state.notice) $('stage').append(` ${state.notice}`);
-  $('export-ticked').hidden = !state.effects.some((one) => one.is_ticked);
+  $('export-ticked').hidden = !state.effects.some((effect) => effect.is_ticked);
 };
 
 export const showLedger = (state) => {
@@ -99,32 +99,32 @@ export const showLedger = (state) => {
 };
 
 export const showRecordings = (state, see, remove) => {
-  const without = (one) => {
-    const gone = button('×', () => remove(one.key), 'gone');
-    gone.setAttribute('aria-label', `Remove ${one.name}`);
+  const without = (recording) => {
+    const gone = button('×', () => remove(recording.key), 'gone');
+    gone.setAttribute('aria-label', `Remove ${recording.name}`);
     gone.title = 'Remove this recording from the session';
     return gone;
   };
-  $('strip').replaceChildren(...state.recordings.map((one) => {
+  $('strip').replaceChildren(...state.recordings.map((recording) => {
     const item = make('li');
-    const place = button('', () => see([one.start, one.end]));
-    place.append(make('b', one.name), make('div', fall(one.before, one.now, state)),
-                 make('div', `${(one.end - one.start).toFixed(1)} s`, 'quiet'));
+    const place = button('', () => see([recording.start, recording.end]));
+    place.append(make('b', recording.name), make('div', fall(recording.before, recording.now, state)),
+                 make('div', `${(recording.end - recording.start).toFixed(1)} s`, 'quiet'));
     item.append(place);
-    if (state.recordings.length > 1) item.append(without(one));
+    if (state.recordings.length > 1) item.append(without(recording));
     return item;
-  }), ...state.held_out.map((one) => {
+  }), ...state.held_out.map((recording) => {
     const item = make('li'), place = make('div', '', 'held-out');
-    place.append(make('b', one.name), make('div', 'held out', 'quiet'));
-    item.append(place, without(one));
+    place.append(make('b', recording.name), make('div', 'held out', 'quiet'));
+    item.append(place, without(recording));
     return item;
   }));
   $('held-out').textContent = state.held_out.length
-    ? `Adoptions are checked on ${state.held_out.map((one) => one.name).join(', ')}.`
+    ? `Adoptions are checked on ${state.held_out.map((recording) => recording.name).join(', ')}.`
     : 'Adoptions are checked on blocks of the same recordings, which is weak evidence. Add a '
       + 'recording of another motion as held out.';
-  const findings = state.recordings.flatMap((one) => one.findings.map(
-    (text) => make('li', `${one.name}: ${text}`)));
+  const findings = state.recordings.flatMap((recording) => recording.findings.map(
+    (text) => make('li', `${recording.name}: ${text}`)));
   $('findings').replaceChildren(...(findings.length ? findings : [make('li', 'none', 'quiet')]));
 };
 
@@ -136,10 +136,10 @@ export const showExperiment = (state) => {
   $('experiment-text').textContent = job?.is_running ? `designing … ${
     (100 * job.share).toFixed(0)} %` : job?.error || found?.text || '';
   $('experiment-table').hidden = !found?.contests.length;
-  $('experiment-table').tBodies[0].replaceChildren(...(found?.contests ?? []).map((one) => {
+  $('experiment-table').tBodies[0].replaceChildren(...(found?.contests ?? []).map((contest) => {
     const row = make('tr');
-    row.append(...[titleOf(one.truth), titleOf(one.rival), plain(one.evidence_now),
-                   plain(one.expected_evidence)].map((text) => make('td', text)));
+    row.append(...[titleOf(contest.truth), titleOf(contest.rival), plain(contest.evidence_now),
+                   plain(contest.expected_evidence)].map((text) => make('td', text)));
     return row;
   }));
 };

@@ -32,12 +32,12 @@ export const showShares = (asked, found, tick, see, unit = '') => {
   $('shares-of').textContent = `${found.samples} samples in ${placeOf(asked)}: error ${
     amount(found.before)} → ${amount(found.now)} ${unit}. Share of the squared error now, less the
  penalty of each effect:`;
-  const told = found.shares.filter((one) => one.net > LEAST).slice(0, MOST).map((one) => {
+  const told = found.shares.filter((share) => share.net > LEAST).slice(0, MOST).map((share) => {
     const item = make('li');
-    const place = button('', (event) => tick(one.effect, event.timeStamp));
-    place.title = `explains ${(100 * one.explained).toFixed(1)} % there; tick it`;
-    place.append(make('span', `${titleOf(one.effect)}${one.drives ? ` on ${
-      one.drives.join(', ')}` : ''}`), make('b', `${(100 * one.net).toFixed(0)} %`), bar(one));
+    const place = button('', (event) => tick(share.effect, event.timeStamp));
+    place.title = `explains ${(100 * share.explained).toFixed(1)} % there; tick it`;
+    place.append(make('span', `${titleOf(share.effect)}${share.drives ? ` on ${
+      share.drives.join(', ')}` : ''}`), make('b', `${(100 * share.net).toFixed(0)} %`), bar(share));
     item.append(place);
     return item;
   });

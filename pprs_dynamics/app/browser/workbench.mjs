@@ -111,7 +111,7 @@ const begin = async (since) => {
     wanted = null;
     const scatterOf = {x: 'scatter-x', y: 'scatter-y', drive: 'scatter-drive'};
     for (const [key, value] of Object.entries(axes)) {
-      if ([...$(scatterOf[key]).options].some((one) => one.value === value)) {
+      if ([...$(scatterOf[key]).options].some((option) => option.value === value)) {
         $(scatterOf[key]).value = value;
       }
     }
