@@ -44,7 +44,7 @@ def draw_before_after(
     figure = new_figure(12, 6)
     axes = figure.subplot_mosaic([['bars', 'effort'], ['bars', 'error']], width_ratios=(2, 3),
                                  height_ratios=(3, 2))
-    curves: Curves = [(before, 'model as it was', RED)]
+    curves: Curves = [(before, 'input model', RED)]
     if after is not None:
         curves.append((after, 'with the added effect', BLUE))
     _draw_bars(axes['bars'], curves, noise)

@@ -82,7 +82,7 @@ def main() -> None:
     fall = [float(np.sqrt(np.nanmean(residual.error ** 2))) for residual in residuals]
     draw_before_after(
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
-        f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
+        f'On a motion that was not fitted, {HIDDEN} lowers the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
     photograph(folder / 'why.html', IMAGES / 'diagnose.png')
     write_pages(folder)
