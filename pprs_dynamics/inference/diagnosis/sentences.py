@@ -58,7 +58,7 @@ ALIKE_PACE = 1.25
 COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')  # named as detectable
 LEAST_SHARE = 0.005  # of an error, which is printed as 1 %
 MOST_PLACES = 2  # of an unexplained error in the headline
-MOST_SHARED = 2  # effects of the best set that another one of the table repeats
+MOST_SHARED = 2  # effects that a set has in common with the reported one, and are named
 LEAST_REFIT = 0.01  # share of the error by which refitted numbers matter
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
@@ -163,7 +163,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
               f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
               'Repeat the recording' for suspect in diagnosis.suspects),
-        tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
+        tuple(f'{_against_best(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
               for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command, word_reference(diagnosis.since))
@@ -237,17 +237,22 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     Of sets that differ in shapes only the cheapest.
     """
     rows: dict[str, tuple[str, str, str]] = {}
-    best = Counter(diagnosis.sets[0].names) if diagnosis.sets else Counter()
     for number, fitted in enumerate(diagnosis.sets):
-        names = Counter(fitted.names)
-        text = _set(diagnosis, fitted)
-        if number and (names & best).total() > MOST_SHARED:
-            less, more = _names(diagnosis, best - names), _names(diagnosis, names - best)
-            text = 'the best' + (f' without {less}' if less else '') + (
-                f'{", but" if less else ""} with {more}' if more else '')
+        text = _against_best(diagnosis, fitted) if number else _set(diagnosis, fitted)
         rows.setdefault(text, (text, _rise(fitted.cost) if number else 'the best',
                                word_terms(fitted.terms)))
     return list(rows.values())
+
+
+def _against_best(diagnosis: Diagnosis, ranked: RankedSet) -> str:
+    """Return a set in words; one that is much like the reported set by its difference."""
+    best = Counter(diagnosis.sets[0].names if diagnosis.sets else ())
+    names = Counter(ranked.names)
+    if (names & best).total() <= MOST_SHARED or names == best:
+        return _set(diagnosis, ranked)
+    less, more = _names(diagnosis, best - names), _names(diagnosis, names - best)
+    return 'the reported set' + (f' without {less}' if less else '') + (
+        f'{", but" if less else ""} with {more}' if more else '')
 
 
 def word_terms(terms: CostTerms) -> str:
@@ -275,7 +280,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
     best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
     others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
     others.sort(key=lambda ranked: best <= set(ranked.names))
-    return (f'{_set(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
+    return (f'{_against_best(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
             if others else '')
 
 
