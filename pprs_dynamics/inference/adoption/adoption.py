@@ -134,7 +134,7 @@ class RecordingEntry:
 
     @classmethod
     def of(cls, recording: Recording, path: str | PathLike[str] | None = None) -> RecordingEntry:
-        """Return what the ledger says of a recording, which may come from no file."""
+        """Return the ledger's entry of a recording, which may come from no file."""
         time = recording.epoch + recording.time
         sha256 = samples_fingerprint(recording) if path is None else fingerprint(path)
         return cls(recording.name, sha256, (float(time[0]), float(time[-1])))

@@ -25,7 +25,7 @@ REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
 
 @dataclass(frozen=True)
 class AdoptionRun:
-    """What was adopted, one after the other, and why it ended.
+    """Result of adopting all reported effects: the steps, and why the run ended.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
 
 
 class Answer:
-    """What a row of a table says.
+    """Effects, values, errors and verdict of a row of the table of models.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Answer:
         return remaining
 
     def force(self, candidate: EffectCandidate | UnknownCandidate) -> Array:
-        """Return what a candidate of the row contributes, (M, D) [N]."""
+        """Return the force of a candidate of the row, (M, D) [N]."""
         return self.fits.components.force(self.fitted, candidate, self.remaining.shape)
 
     def over_noise(self, error: Array) -> float:
@@ -295,7 +295,7 @@ class Answer:
         return tuple((name, *others) for name, others in rivals.items() if others)
 
     def _candidates(self) -> tuple[RankedSet, ...]:
-        """Return the effects that were fitted as the only one, the best first."""
+        """Return the effects that were fitted alone, the best first."""
         first = self.table.first
         none = first.evaluate(()).terms
         return tuple(self._ranked(fitted, fitted.terms, none, linear_error(first, fitted))

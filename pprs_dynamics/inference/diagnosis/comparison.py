@@ -158,7 +158,7 @@ def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Bl
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """Model against measurement on one drive.
+    """Error of the model on one drive: rms, bias, peak, explained share and noise.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All drives, and what they pool to.
+    """Errors of all drives, and of all together.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which physical effect a model lacks: the whole way from recordings to an answer."""
+"""Diagnosis of recordings: gates, search, and the answer."""
 
 from __future__ import annotations
 

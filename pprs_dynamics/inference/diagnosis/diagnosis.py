@@ -215,7 +215,7 @@ class RivalEffect:
 
 @dataclass(frozen=True)
 class SinceReference:
-    """What a reference run says of the recordings of a diagnosis.
+    """Coverage and explained error of the reference runs of a diagnosis.
 
     Parameters
     ----------

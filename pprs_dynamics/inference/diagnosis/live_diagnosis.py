@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What changed on a running robot: one window of its stream diagnosed after the other.
+"""Live diagnosis: windows of a stream of joint states, one after the other.
 
 A window is diagnosed as a recording. Its effects are claimed once the model that was fitted to it
 predicts the next window better than the model without them, and the diagnosis of that window
@@ -86,7 +86,7 @@ class LiveEffect:
 
 @dataclass(frozen=True)
 class Window:
-    """What the diagnosis of one window of the stream says.
+    """Diagnosis of one window of the stream, with the fitted models.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Window:
 
 @dataclass(frozen=True)
 class LiveDiagnosis:
-    """What is known of a stream, window after window; each step returns another one.
+    """Effects found in a stream up to its latest window; immutable.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class LiveDiagnosis:
         return content
 
     def with_window(self, recording: Recording, start: float) -> LiveDiagnosis:
-        """Return what is known with one more window.
+        """Return the live diagnosis updated by one more window.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What to do after a diagnosis: in words, and as a command with the names of the files."""
+"""The next step after a diagnosis, in words and as a command."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def _need_another_load(names: Sequence[str]) -> bool:
 
 
 def _curve(diagnosis: Diagnosis) -> str | None:
-    """Return the curve that takes what no effect explains, as `adopt` takes it."""
+    """Return the request of `adopt` for a curve over what no effect explains; None for none."""
     for statement in diagnosis.depends_on:
         name, _, other = statement.variable.partition(' of ')
         if name in (OF if other else OWN):

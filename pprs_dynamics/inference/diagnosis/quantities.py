@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Numbers and names as people read them: 10.2 ± 0.4 mm/s, all six drives, a or b."""
+"""Format numbers and names for people: 10.2 ± 0.4 mm/s, all six drives, a or b."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _of_effort(share: float) -> str:
 
 
 def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:
-    """Return what a set of drives is called: all six drives, all three lifts, lift_1 and lift_3."""
+    """Return the name of a set of drives: all six drives, all three lifts, lift_1 and lift_3."""
     kinds = {'drives': list(every), **{f'{kind}s': [d for d in every if d.startswith(f'{kind}_')]
                                        for kind in ('slide', 'lift')}}
     for kind, alike in kinds.items():
@@ -150,7 +150,7 @@ def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:
 
 
 def with_drives(name: str, drives: tuple[str, ...] | None, every: tuple[str, ...]) -> str:
-    """Return what it is and where it sits."""
+    """Return an effect's name with its drives."""
     return name if drives is None else f'{name} on {name_drives(drives, every)}'
 
 

@@ -257,7 +257,7 @@ def place_on(group: Sequence[Statement]) -> str:
 
 
 def place_of(variable: str) -> str:
-    """Return in words what an error depends on."""
+    """Return the variable of an error as a clause: depending on velocity."""
     return 'at one frequency' if variable == 'frequency' else f'depending on {in_words(variable)}'
 
 

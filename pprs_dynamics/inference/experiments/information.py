@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Information of a motion that nobody has made yet, and criteria of experiment design.
+"""Fisher information of a planned motion, and criteria of experiment design.
 
 Columns are those of `regression.design`, so that the information of a motion and that of the
 recordings add up. As in a fit they are transformed by the orthonormal DCT and divided by the root
@@ -184,7 +184,7 @@ class Information:
         return Design.planned(self._sensitivities, forces, time, block)
 
     def prior(self) -> Array:
-        """Return what is known of the base columns beforehand."""
+        """Return the prior precision of the base columns."""
         known = np.zeros(self.size)
         known[:len(self.base)] = [column.precision for column in self.base]
         return np.diag(known)

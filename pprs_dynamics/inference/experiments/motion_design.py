@@ -230,7 +230,7 @@ class Motions:
                 else platform_motion(series, time))
 
     def forces(self, series: JointSeries, time: Array) -> Forces:
-        """Return what the model says of a series at times [s]."""
+        """Return the model's forces along a series at times [s]."""
         return self.model.drive_forces(self.sampled(series, time))
 
     def uses(self, series: JointSeries, time: Array | None = None) -> dict[str, float]:

@@ -128,7 +128,7 @@ class Experiment:
     determined: tuple[int, int] | None = None
 
     def forces(self, time: Array) -> Forces:
-        """Return what the model says of the motion at times [s]."""
+        """Return the model's forces along the motion at times [s]."""
         return self.model.drive_forces(self.motion(time))
 
     @property
@@ -281,7 +281,7 @@ def check_duration(duration: float) -> None:
 
 
 def _expected(question: Question, after: Array) -> tuple[ExpectedEvidence, ...]:
-    """Return what a motion promises for every pair of effects of the contests."""
+    """Return the expected evidence of a motion for every pair of effects."""
     found = []
     for contest in question.contests:
         gained = max(contest.misfit(after) - contest.misfit(question.known), 0.0)

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Base models from recordings: what a description or tolerances leave open."""
+"""Base models fitted to recordings, and reference runs."""

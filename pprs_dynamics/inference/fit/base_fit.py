@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The base model that recordings call for, and how well it predicts what it was not fitted to."""
+"""Fit of the base model to recordings, and its error on data that were not fitted."""
 
 from __future__ import annotations
 

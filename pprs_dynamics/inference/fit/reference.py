@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-r"""What a reference run says of another recording: its forces known in part, and how well.
+r"""Prediction of the repeatable error of a recording from reference runs, with its uncertainty.
 
 .. math::
 
@@ -159,7 +159,7 @@ class Reference:
         return ''
 
     def carried_over(self, design: Design) -> CarriedOver:
-        """Return what it says of the recordings of a design."""
+        """Return the predicted forces on the recordings of a design, with their uncertainty."""
         return self._carried_over(design.residuals, design.reconstructions)
 
     def shown_by(self, recordings: Sequence[Recording]) -> Array:

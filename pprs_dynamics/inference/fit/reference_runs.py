@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Reference runs by their files, those that a model file names among them."""
+"""Reference runs: their files, also those that a model file names, read and checked."""
 
 from __future__ import annotations
 

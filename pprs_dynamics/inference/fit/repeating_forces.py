@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-r"""Forces that no number of a model explains but that repeat when the machine repeats its motion.
+r"""Repeatable forces that no number of a model explains: Gaussian processes and waves.
 
 A Gaussian process over states, s = (q / l_q, tanh(v / v_0) / l_v), is a finite sum, Phi(s) w, over
 states that a pivoted Cholesky factor of its kernel chooses. States of a recording that these do not

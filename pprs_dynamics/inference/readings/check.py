@@ -90,7 +90,7 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
 
 
 def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]:
-    """Return where a recording is read better otherwise than its names and units say.
+    """Return the mistakes of a recording's names, units and signs, as findings.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ class Search:
                    price + table.COST['drive_constant'], '')
 
     def _weights(self, excerpt: Excerpt, evidence: Evidence) -> Array:
-        """Return what each drive counts, (D,): the strongest 1, one at rest among others 0."""
+        """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
         effort = np.sqrt(np.nanmean(np.nan_to_num(excerpt.effort) ** 2, axis=0))
         moves = evidence.speed > self.model.reversal.velocity
         sizes = np.maximum(effort / max(effort.max(), 1e-300),

@@ -65,7 +65,7 @@ class AmbiguousColumns(GuessError):
 
 
 def _line(joints: Sequence[str], reading: Columns) -> str:
-    """Return what is below `columns` of a model file."""
+    """Return the content of the block `columns` of a model file."""
     entries = {joint: ', '.join(f'{key}: {scalar(column)}' for (of, key), column in reading.items()
                                 if of == joint) for joint in ('', *joints)}
     return ', '.join(f'{scalar(joint)}: {{{entry}}}' if joint else entry

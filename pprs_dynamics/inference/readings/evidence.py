@@ -131,7 +131,7 @@ class Evidence:
         return bool(self.count[drive, column] > EFFORT and self.total[drive, column] > 0)
 
     def likelihood(self, drive: int, column: int, scale: float, masses: float) -> Likelihood:
-        """Return how likely efforts are `scale` times those of a drive.
+        """Return the log-likelihood that efforts are `scale` times those of a drive.
 
         Inertia and gravity are the model's within a relative tolerance of its masses, friction
         opposes the motion with any size, and a constant is small in comparison.

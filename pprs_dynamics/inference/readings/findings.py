@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a recording's numbers mean instead of what its names and units say, as findings."""
+"""Findings about a recording: units, signs or order other than its names say."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Scales = tuple[tuple[str, str, float | str | int], ...]
 
 @dataclass(frozen=True)
 class Mistake(Defect):
-    """A finding about what a recording's numbers mean.
+    """A finding about units, signs, order or kind of a recording's numbers.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | 
 
 
 def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]:
-    """Return what of the findings of recordings says that efforts are no measurement."""
+    """Return the findings that efforts are no measurement."""
     return [finding for each in findings for finding in each if isinstance(finding, NoMeasurement)]
 
 

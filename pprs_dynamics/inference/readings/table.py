@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Everything that decides a reading: units, names, prior costs and thresholds, and the hypotheses.
+"""Hypotheses about a file: units, names, prior costs and thresholds, in one table.
 
 A hypothesis is a way to read a recording. Its score is a log-likelihood, from the regression of
 `evidence.py`, less its prior cost. The plain reading, by names and units, has no cost.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Columns that take part in every fit: what the model has already, and how friction turns over.
+"""Columns of every fit: the model's uncertain numbers, and the width in which friction reverses.
 
 A coefficient of 0 is the model as it was given. Each type knows its prior and what its
 coefficient means for the model's values.
@@ -223,7 +223,7 @@ def present_columns(effect: CatalogueEffect, known: Mapping[str, float],
 
 @dataclass(frozen=True)
 class CarriedOver:
-    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
+    """Predicted forces of a reference run; see `pprs_dynamics.inference.fit.reference`.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Columns of the regression: the model's own numbers, and every catalogue effect that may lack.
+"""Design of the regression: columns of the model's numbers and of every effect of the catalogue.
 
 Model and columns are computed at full rate from one motion and then averaged in blocks, as the
 measured effort is; were one side treated otherwise, each reversal would look like friction.
@@ -447,7 +447,7 @@ class Design:
         return present_values(there, name)
 
     def known_change(self, term: Term) -> dict[int, Array]:
-        """Return what a term changes whatever its coefficients, (M,) by drive.
+        """Return the change by a term that does not depend on its coefficients, (M,) by drive.
 
         Of an effect that the given model has in another shape, what the other shape does to the
         coefficients that are there; nothing for all others.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What drives did in recordings: strokes, speeds, delays, further channels and encoders."""
+"""Ranges of the drives in recordings: strokes, speeds, delays, temperatures, second encoders."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 
 
 def drive_range(model: DriveModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
-    """Return what a drive of a model did in recordings."""
+    """Return positions, speeds and delays of a drive in recordings."""
     position = np.concatenate([recording.position[:, drive] for recording in recordings])
     velocity = np.concatenate([recording.velocity[:, drive] for recording in recordings])
     longest = max(recordings, key=lambda recording: len(recording.time))

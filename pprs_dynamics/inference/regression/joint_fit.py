@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-r"""All drives' errors fitted together: what the model has, what it may lack, and the noise.
+r"""Joint fit of the errors of all drives: model numbers, added effects, and coloured noise.
 
 With the transformed errors y_d of the drives, columns X_d and noise spectra S_d, a set of columns
 with Gaussian priors of precision Lambda about 0 has the penalised deviance

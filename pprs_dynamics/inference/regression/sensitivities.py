@@ -292,7 +292,7 @@ class Sensitivities:
         return columns
 
     def _change(self, number: Number, moved: DriveModel, forces: Any, samples: Samples) -> Array:
-        """Return what a number moved by `RELATIVE_STEP` of itself changes, (M, 1, D)."""
+        """Return the change of the forces by `RELATIVE_STEP` of a number, (M, 1, D)."""
         state = forces.mechanism
         if number.key == GAIN:
             # The more torque an ampere gives, the fewer amperes the model's torque takes.

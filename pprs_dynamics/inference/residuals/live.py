@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured efforts against the model while they come in."""
+"""Residuals of a live stream of joint states."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From a model and recordings to residuals: both sides on the same motion, treated alike."""
+"""Residuals of a model on recordings: model and measured effort filtered alike."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def treated_table(
     progress: Callable[[int, int], None] | None = None,
     more: Callable[[Any, Treatment], Mapping[Any, Array]] = lambda forces, treat: {},
 ) -> dict[Any, Array]:
-    """Return all that a comparison needs of one recording, treated, by name.
+    """Return the filtered signals of one recording that a comparison needs, by name.
 
     Parameters
     ----------

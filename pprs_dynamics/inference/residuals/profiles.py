@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a figure of the error needs: means over bins with their uncertainty, and the spectrum."""
+"""Profiles of the error: means over bins with their uncertainty, and the spectrum."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From measured drive positions to the motion of what they move, at every sample of a recording.
+"""Reconstruction of the mechanism's motion from measured drive positions, sample by sample.
 
 Per segment: equal steps, smoothed position, velocity and acceleration of the drives, and, for a
 3-PPRS, forward kinematics that follows the branch, and the platform's twist and acceleration

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where an added body is, so that its columns hold its inertia.
+"""Centres of added bodies, about which their columns contain their inertia.
 
 The inertia of a body about a joint grows with the square of its distance, which no column that is
 linear in its mass and first moment says. Columns are taken about the centre of the point mass that

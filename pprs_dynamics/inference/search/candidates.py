@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What may be missing: effects on drives, in the structure, and their prior costs."""
+"""Candidates: effects on drives and in the structure, patterns, and their prior costs."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ class Component:
         return found
 
     def total(self, coefficients: Array) -> Array:
-        """Return all of the effect's coefficients, with those that the given model has."""
+        """Return all coefficients of the effect, those of the given model added."""
         every = self.every(coefficients)
         if self.centre and issubclass(self.effect, AddedBody):
             # Columns about another centre than the body's put its distance from it in its inertia.
@@ -209,7 +209,7 @@ class EffectCandidate:
 
     @classmethod
     def of(cls, components: Iterable[Component]) -> EffectCandidate:
-        """Return the effect that components of one effect are."""
+        """Return the candidate of components of one effect."""
         ordered = tuple(sorted(components, key=lambda c: -1 if c.drive is None else c.drive))
         return cls(ordered[0].effect, ordered)
 
@@ -465,7 +465,7 @@ class PriorCosts:
         return cls(names, len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:
-        """Return the prior cost of one more effect, whichever."""
+        """Return the prior cost of one more effect."""
         return 2 * log(self.names) - 2 * log(self.decisions.effect_odds)
 
     def of_drives(self, count: int) -> float:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""All terms that the catalogue offers for a design, and the gain of each."""
+"""Terms of all effects of the catalogue in a design, and the gain in likelihood of each."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class DriveComponents:
         return found
 
     def rows_of(self, effect: type[DriveEffect]) -> Array:
-        """Return what an effect does in all shapes tried, (k, n), transformed."""
+        """Return the transformed columns of an effect in all shapes tried, (k, n)."""
         return self.score_test.rows[self.d][self._places[effect]]
 
     def _tried(self, effect: type[DriveEffect]) -> tuple[list[tuple[Term, int, int]], Array]:
@@ -396,7 +396,7 @@ class Components:
         return self._prior_costs[component]
 
     def force(self, fitted: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
-        """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
+        """Return the force of a candidate of a set, (M, D) [N]."""
         force = np.zeros(shape)
         if isinstance(candidate, UnknownCandidate):
             for d, block in candidate.parts.items():

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What coefficients of a set may be: one list of inequalities, solved at once.
+"""Constraints on the coefficients of a set: linear inequalities, solved at once.
 
 - Each parameter is within the bounds of its effect.
 - No drive has less than no inertia, viscous, dry or load friction, the model's own included.

@@ -72,7 +72,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What a fit says about an effect.
+    """Estimates of the parameters of an effect.
 
     Parameters
     ----------

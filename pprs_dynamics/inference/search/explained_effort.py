@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much of the drives' efforts a model explains, and where that is little.
+"""Share of the drives' efforts that a model explains.
 
 Whatever a search for effects says: a model that explains less than half of what a drive does is
 not yet a model of that drive, and no noise accounts for the rest.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sets of candidates, fitted: their cost, and shapes moved to where it is lowest."""
+"""Fitted sets of candidates: their cost, with shapes at its minimum."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Nuisance = Mapping[Component, Mapping[str, Block]]
 
 
 class FittedSets:
-    """All sets of one design that were fitted.
+    """Fitted sets of one design, each fitted once.
 
     Parameters
     ----------

@@ -148,7 +148,7 @@ class HeldOut:
     residuals: Residuals
 
     def gain(self, other: HeldOut) -> PredictiveGain:
-        """Return what another set gains on this one."""
+        """Return the predictive gain of another set over this one."""
         found = predictive_gain(self.residuals, other.residuals)
         # Each fit pays for the numbers that it moves, all drives alike.
         share = (self.penalties - other.penalties) / (BLOCKS * len(found.drives))

@@ -102,7 +102,7 @@ class _Transformed:
 
 
 class DrivePatterns:
-    """Patterns of one drive.
+    """Patterns of the error of one drive, and their columns.
 
     Parameters
     ----------

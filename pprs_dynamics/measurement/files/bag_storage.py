@@ -223,6 +223,6 @@ def _check_lengths(path: Path, storage: Path) -> None:
 
 
 def damaged(error: Exception) -> str:
-    """Return what is said of a bag that a library cannot read."""
+    """Return the error for a bag that a library cannot read."""
     reason = ' '.join(str(error).split()) or type(error).__name__
     return f'cannot be read as a bag, it is truncated, damaged or something else ({reason[:160]})'

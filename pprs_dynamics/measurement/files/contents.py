@@ -46,7 +46,7 @@ class Contents:
 
 
 def look_into(path: Path) -> Contents:
-    """Return what a recording holds.
+    """Return the topics, columns and drives of a recording.
 
     Raises
     ------

@@ -205,7 +205,7 @@ class CsvTable:
         return self.names.index(column) if column in self.names else None
 
     def title(self, place: int) -> str:
-        """Return what a column is called."""
+        """Return the title of a column."""
         return self.names[place] if self.names else str(place + 1)
 
     def _numbers(self, lines: list[str], start: int, used: Sequence[int], dates: set[int],

@@ -43,7 +43,7 @@ def message_types() -> Any:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where what stands in a serialised JointState.
+    """Offsets of the fields of a serialised JointState.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ def init_command(name: str) -> str:
 
 
 def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> str:
-    """Return what a file lacks of some drives, which names it holds, and what to write.
+    """Return a hint for missing drives: the line to write in the model file, or `pprs init`.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> s
 
 
 def common_prefix(drives: Sequence[str], known: Collection[str]) -> str:
-    """Return what stands before the names of all drives among those known; '' for nothing."""
+    """Return the common prefix of all drives among the recorded names; '' for none."""
     first = [recorded.removesuffix(drives[0]) for recorded in known if recorded.endswith(drives[0])
              ] if drives else []
     return next((prefix for prefix in sorted(first, key=len) if prefix and all(

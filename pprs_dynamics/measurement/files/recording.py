@@ -115,7 +115,7 @@ class Recording(Samples):
 
 @dataclass(frozen=True)
 class DriveSummary:
-    """What one drive did.
+    """Range of positions, speeds and efforts of one drive.
 
     Parameters
     ----------
@@ -332,7 +332,7 @@ def write_recording(
 
 
 def describe(recording: Recording) -> Summary:
-    """Return what is in a recording: rates, duration, ranges, findings."""
+    """Return a summary of a recording: rates, duration, ranges, findings."""
     time = recording.time
     segments = tuple(
         SegmentSummary(float(time[part.start]), float(time[part.stop - 1]),
@@ -357,7 +357,7 @@ def describe(recording: Recording) -> Summary:
 
 
 def _numbers(quantity: str, values: ArrayLike) -> Array:
-    """Return what a caller gave as numbers, or raise MotionError naming the quantity."""
+    """Return a caller's argument as an array, or raise MotionError naming the quantity."""
     try:
         return as_numbers(values)
     except (TypeError, ValueError) as error:

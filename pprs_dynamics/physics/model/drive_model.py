@@ -239,7 +239,7 @@ class DriveModel:
 
     @cached_property
     def recorded(self) -> RecordedDrives:
-        """How recordings hold the drives, by what the model file says.
+        """Names, columns and units of the drives in recordings, from the model file.
 
         Raises
         ------
@@ -266,7 +266,7 @@ class DriveModel:
 
     @property
     def effort_kind(self) -> str:
-        """What the efforts of recordings are: one of `EFFORT_KINDS`."""
+        """Kind of the recorded efforts, one of `EFFORT_KINDS`."""
         return effort_kind(self.values)
 
     @property
@@ -287,7 +287,7 @@ class DriveModel:
         return current
 
     def offers(self, effect: type[CatalogueEffect]) -> bool:
-        """Return whether an effect of the catalogue can act in what this is a model of."""
+        """Return whether an effect of the catalogue can act in this robot."""
         return self.kind in effect.acts_in and (
             len(self.drives) > 1 or not effect.needs_several_drives)
 

@@ -124,7 +124,7 @@ class EffortFilter(MeasurementEffect):
 
 
 def lag(signal: Array, step: float, time_constant: float, entered: float, left: float) -> Array:
-    """Return what a first-order lag makes of a signal, (N,), exact for straight lines.
+    """Return a signal (N,) behind a first-order lag, exact for straight lines.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ class ElasticJoint(MeasurementEffect):
         return self.by_drive(drives, transmitted, lambda load, own: own['compliance'] * load)
 
     def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
-        """Return what the second encoder says otherwise than loads, of positions and rates."""
+        """Return errors of positions and rates by the difference of second encoder and load."""
         error = np.zeros_like(windup)
         for name, values in self.drives.items():
             k = drives.index(name) if name in drives else -1

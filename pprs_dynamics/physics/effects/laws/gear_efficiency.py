@@ -14,7 +14,7 @@ from pprs_dynamics.physics.effects.effect import Parameter
 
 
 class GearEfficiency(DriveEffect):
-    """A share of what a gear passes on is lost, another one where the load drives the motor.
+    """Losses of a gear in proportion to its torque, other ones where the load drives the motor.
 
     Equation
     --------
@@ -56,7 +56,7 @@ class GearEfficiency(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return what is lost per share, driving and driven back.
+        """Return the columns of the losses, driving and driven back.
 
         With a smooth sgn s both turn over as |tau| s does: (|tau| s + tau s^2) / 2 and
         (|tau| s - tau s^2) / 2.

@@ -17,7 +17,7 @@ from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class HomingError(MeasurementEffect):
-    """The whole mechanism stands elsewhere than its encoders say.
+    """Error of the zero of a drive's positions.
 
     Equation
     --------
