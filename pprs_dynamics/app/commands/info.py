@@ -154,8 +154,8 @@ def mechanism_lines(model: DriveModel) -> list[str]:
     if s.loops:
         lines += ['loops: ' + ', '.join(f'{loop.name} ({loop.kind}, {loop.a} on {loop.b})'
                                         for loop in s.loops),
-                  f'{len(s.mobility.rows)} independent rows close them at home; condition number '
-                  f'{s.mobility.condition:.3g} (lengths in units of {s.size:.3g} m)']
+                  f'{len(s.mobility.rows)} independent constraints close them at home; condition '
+                  f'number {s.mobility.condition:.3g} (lengths in units of {s.size:.3g} m)']
     lines.append('home: ' + ', '.join(
         f'{name} {value:.4g} {"rad" if unit.turns else "m"}' for name, value, unit in zip(
             s.drives, s.home[s.tables.drives], model.units, strict=True)))
