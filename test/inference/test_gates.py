@@ -81,7 +81,7 @@ def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() ->
     # Of a wrist that gains and a slide that hardly loses the sum in newtons or newton metres rises.
     assert case.objections(sure, (141.9, 141.91), 'the recordings', 'N or N m') == ()
     said, = case.objections(unsure, (1.0, 0.9), 'the recordings', 'N')
-    assert 'falls from 1 N to 0.9 N; the fall is 0.5 standard errors' in said
+    assert 'falls from 1 N to 0.9 N, by 0.5 standard errors' in said
 
 
 @pytest.mark.parametrize('slow', [False, True])

@@ -114,8 +114,10 @@ def adopt(
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
-    reason = '; '.join(found.objections) or f'the error on {case.held_out} ' + change(
-        found.held_out_before, found.held_out_after, found.unit)
+    fall = change(found.held_out_before, found.held_out_after, found.unit)
+    reason = '. '.join(text[:1].upper() + text[1:] if number else text
+                       for number, text in enumerate(found.objections)
+                       ) or f'the error on {case.held_out} {fall}'
     remarks = (*found.remarks, WEAK) if is_sure and not validate else found.remarks
     return replace(found, adopted=is_sure or force, reason=reason, remarks=remarks)
 
@@ -185,10 +187,10 @@ class _Case:
         if gain.confirms(asked):
             return ()
         sure = gain.certainty
-        why = (f'on {listed(gain.losing)} it certainly rises' if gain.losing else
-               f'weighted by the noise it rises by {-sure:.2g} standard errors' if sure < 0 else
-               f'the fall is {sure:.2g} standard errors, and more than {asked:g} are required')
-        return (f'{said}; {why}',)
+        why = (f'but on {listed(gain.losing)} it certainly rises' if gain.losing else
+               f'but weighted by the noise it rises by {-sure:.2g} standard errors' if sure < 0 else
+               f'by {sure:.2g} standard errors, and more than {asked:g} are required')
+        return (f'{said}, {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
                  residuals: Sequence[Residuals], held_out: Sequence[float],
