@@ -78,7 +78,7 @@ def test_the_error_falls_to_the_noise_along_another_motion(
     assert answer.adopted, answer.reason
     assert answer.held_out_after < 1.1 * answer.noise_floor < 0.5 * answer.held_out_before
     assert answer.to_dict()['effect'] == f'measured_curve:lift_1@{variable}'
-    assert 'no cause' in answer.remarks[0]
+    assert 'not a cause' in answer.remarks[0]
 
 
 def test_where_nothing_is_missing_it_is_refused(model: DriveModel) -> None:
