@@ -29,7 +29,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
-from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain
+from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain, sentence
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     Sentences,
@@ -220,7 +220,7 @@ def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
 
 def finding_lines(finding: Finding) -> list[tuple[str, str]]:
     """Return labelled lines of a finding, without the test that confirms it."""
-    return [('missing', finding.what), ('why', finding.why), ('cause', finding.cause),
+    return [('finding', finding.what), ('why', finding.why), ('cause', finding.cause),
             *(('note', remark) for remark in finding.remarks)]
 
 
@@ -289,11 +289,13 @@ def diagnosis_page(
     _add_tables(page, _alternatives(diagnosis))
     page.folded_list(*suspects)
     page.folded_list(*barred)
-    page.heading('Detection limits and method')
+    page.heading('Not seen, and from which size it would have been')
+    if not diagnosis.detectable:
+        page.text('Sizes are computed for the verdicts adequate and effect.', 'note')
     _add_tables(page, _unseen(diagnosis))
     with page.fold('Method'):
         page.text(' '.join(METHOD))
-        page.bullets(diagnosis.notes)
+        page.bullets(map(sentence, diagnosis.notes))
     return page
 
 
@@ -339,7 +341,7 @@ def _card(page: Page, diagnosis: Diagnosis, finding: Finding, effect: FoundEffec
 def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     """Add a card with pictures for each pattern that no effect explains."""
     for finding, group in zip(words.unexplained, unexplained_groups(diagnosis), strict=True):
-        pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
+        pictures = [(figures.unknown_picture(diagnosis, statement), sentence(statement.text))
                     for statement in group]
         with page.fold(finding.title[:1].upper() + finding.title[1:]):
             page.card(finding_lines(finding),

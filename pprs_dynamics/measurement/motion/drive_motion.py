@@ -29,6 +29,7 @@ from pprs_dynamics.measurement.motion.treatment import (
     block_length,
     motion_bandwidth,
 )
+from pprs_dynamics.system.plain_text import counted
 
 # Readers of files take a while to import, and a live node reads none.
 if TYPE_CHECKING:
@@ -305,8 +306,8 @@ def _block(
                      'without a mean')
         return 1
     block = block_length(grids[0].step, duration)
-    notes.append(f'effort and model are both averaged over blocks of {block} samples; a block '
-                 'with a missing effort does not count')
+    notes.append(f'effort and model are both averaged over blocks of {counted(block, "sample")}. A '
+                 'block with a missing effort does not count')
     return None
 
 
