@@ -71,7 +71,7 @@ def test_exchanged_drives_are_told_where_all_others_fit(exchanged: str, pair: tu
     order = [*range(6)]
     order[pair[0]], order[pair[1]] = pair[1], pair[0]
     position = POSITION if exchanged == 'efforts' else POSITION[:, order]
-    one, = told(position, EFFORT if exchanged == 'positions' else EFFORT[:, order])
+    found, = told(position, EFFORT if exchanged == 'positions' else EFFORT[:, order])
     first, second = (MODEL.drives[place] for place in pair)
-    assert one.kind == 'drive_order'
-    assert f'the {exchanged} look recorded in another order: {second} like {first}' in one.text
+    assert found.kind == 'drive_order'
+    assert f'the {exchanged} look recorded in another order: {second} like {first}' in found.text

@@ -160,12 +160,12 @@ def test_exchanged_columns_of_two_joints_are_named_beside_a_reference(
         exchanged: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model, order = arm.real_arm(tmp_path), [1, 0, 2]
     write_model(tmp_path / 'model.yaml', model.values)
-    for name, one in (('before', run(model, 0, 1)), ('later', run(model, 5, 2, change=0.6))):
+    for name, made in (('before', run(model, 0, 1)), ('later', run(model, 5, 2, change=0.6))):
         if name == where:
-            one = Recording.from_arrays(
-                name, one.time, one.position[:, order if exchanged != 'efforts' else [0, 1, 2]],
-                None, one.effort[:, order if exchanged != 'positions' else [0, 1, 2]], one.drives)
-        write_recording(tmp_path / f'{name}.csv', one)
+            made = Recording.from_arrays(
+                name, made.time, made.position[:, order if exchanged != 'efforts' else [0, 1, 2]],
+                None, made.effort[:, order if exchanged != 'positions' else [0, 1, 2]], made.drives)
+        write_recording(tmp_path / f'{name}.csv', made)
     before, later = (str(tmp_path / f'{name}.csv') for name in ('before', 'later'))
     assert main(['diagnose', later, '--reference', before, '--model',
                  str(tmp_path / 'model.yaml')]) == 1
