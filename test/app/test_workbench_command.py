@@ -20,16 +20,16 @@ from pprs_dynamics.measurement.files.recording import read_recording, write_bag
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('command')
     (folder / 'data').mkdir()
-    write_hidden(folder / 'data' / 'run.csv', 1, 8.0)
+    write_hidden(folder / 'data' / 'run.csv', 1)
     return folder
 
 
 def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> None:
     bags = folder / 'bags'
     bags.mkdir()
-    write_hidden(bags / 'plain.csv', 4, 8.0)
+    write_hidden(bags / 'plain.csv', 4)
     for seed, name in ((1, 'first.mcap'), (2, '../other.mcap')):
-        samples = read_recording(write_hidden(folder / 'spare.csv', seed, 8.0))
+        samples = read_recording(write_hidden(folder / 'spare.csv', seed))
         write_bag(bags / name, {'/left/joint_states': samples, '/right/joint_states': samples})
     with workbench(bags, '--topic', '/right/joint_states', '--validate', folder / 'other.mcap',
                    folder=folder) as bench:

@@ -29,8 +29,8 @@ SECRET = 'no business of a browser'
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('safety')
     (folder / 'given').mkdir()
-    write_hidden(folder / 'run.csv', 1, 8.0)
-    write_hidden(folder / 'given' / 'one.csv', 2, 8.0)
+    write_hidden(folder / 'run.csv', 1)
+    write_hidden(folder / 'given' / 'one.csv', 2)
     (folder / 'secret.csv').write_text(SECRET)
     (folder / 'given' / 'link.csv').symlink_to(folder / 'secret.csv')
     return folder
@@ -170,7 +170,7 @@ def test_uploads_are_bounded_and_read_by_the_strict_readers(bench: Workbench, fo
     for _ in range(MOST_UPLOADS):  # what failed does not count
         assert upload(bench, b'time,\n1,2\n') == 400
     assert len(bench.screen()['recordings']) == before
-    other = write_hidden(folder / 'other.csv', 3, 8.0)
+    other = write_hidden(folder / 'other.csv', 3)
     assert upload(bench, other.read_bytes(), '..%2f..%2fother.csv') == 200
     assert len(bench.screen()['recordings']) == before + 1
     assert not (folder.parent / 'other.csv').exists()

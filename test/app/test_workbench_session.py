@@ -32,7 +32,7 @@ MASS = HIDDEN['effects.payload_mass.mass']
 
 @pytest.fixture(scope='module')
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_hidden(tmp_path_factory.mktemp('workbench') / 'run.csv', 1)
+    return write_hidden(tmp_path_factory.mktemp('workbench') / 'run.csv', 1, 16.0)
 
 
 @pytest.fixture(scope='module')

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`--file-budget SECONDS`: report the dearest test files; one that takes more fails the run.
+"""`--file-budget SECONDS`: report the dearest test files; one far over the budget fails the run.
 
 Time is processor time over what a fixed piece of work takes meanwhile. A slower or busier machine
-prolongs both alike.
+prolongs both, but not quite alike: caches, disks and browsers count otherwise. So a file over the
+budget is marked, and only one over `NOISE` times the budget fails.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ import pytest
 
 SHOWN = 15  # files
 IDLE = 0.0245  # [s] of `fixed_work` on an idle core of the machine that the budget is meant for
-NOISE = 1.1  # of a measurement over the budget: two runs of a file differ by less
+# Of a measurement. The same file took 1.4 times as long on one machine as on another, and 1.44
+# times as long in the first run after a start of the machine as in the second.
+NOISE = 1.5
 SECONDS, PACE = 'processor_seconds', 'pace'
 BEGAN = pytest.StashKey[float]()
 SINCE: dict[str, Any] = {}
@@ -83,7 +86,7 @@ def by_file(config: pytest.Config) -> Counter[str]:
 
 
 def over_budget(config: pytest.Config) -> list[str]:
-    """Return the files that take more than the budget."""
+    """Return the files that take more than the budget on any machine."""
     budget = config.getoption('--file-budget', default=None)
     return [] if budget is None else [file for file, spent in by_file(config).items()
                                       if spent > NOISE * budget]
@@ -97,5 +100,6 @@ def report(terminalreporter: Any, config: pytest.Config) -> None:
     dear, over = by_file(config), over_budget(config)
     terminalreporter.section(f'processor time by file on an idle machine, budget {budget:g} s')
     for file, spent in dear.most_common(SHOWN):
-        terminalreporter.line(f'{spent:7.1f} s  {file}' + ('  OVER' if file in over else ''))
+        mark = '  OVER, fails' if file in over else '  over' if spent > budget else ''
+        terminalreporter.line(f'{spent:7.1f} s  {file}{mark}')
     terminalreporter.line(f'{sum(dear.values()):7.1f} s  in {len(dear)} files')

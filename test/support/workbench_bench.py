@@ -23,7 +23,7 @@ HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
           'effects.coulomb_friction.lift_2.force': 0.6, 'effects.payload_mass.mass': 0.15}
 
 
-def write_hidden(path: Path, seed: int, duration: float = 16.0,
+def write_hidden(path: Path, seed: int, duration: float = 8.0,
                  hidden: Mapping[str, Any] = HIDDEN) -> Path:
     """Write a recording of the paper's robot with effects, and return its path."""
     robot = DriveModel.from_parameters({**default_parameters(), **hidden})

@@ -14,17 +14,29 @@ SETTLED = 'bench.state && bench.state.is_settled && bench.curves'
 
 
 class Page:
-    """A tab on the workbench, and what it complained about."""
+    """A tab on the workbench, and its errors and warnings.
+
+    A context costs Chromium two processes, so tests share one and open the page again.
+    """
 
     def __init__(self, browser: Any, bench: Workbench, **options: Any) -> None:
-        self.context = browser.new_context(**{
-            'viewport': {'width': 1500, 'height': 950}, 'bypass_csp': True, **options})
+        self.bench = bench
+        self.context = browser.new_context(**{'bypass_csp': True, **options})
         self.tab = self.context.new_page()
         self.tab.set_default_timeout(PATIENCE)
         self.complaints: list[str] = []
         self.tab.on('console', self._hear)
         self.tab.on('pageerror', lambda error: self.complaints.append(str(error)))
-        self.tab.goto(bench.post('/api/invite').json['address'])
+        self.open()
+
+    def open(self, width: int = 1500, scheme: str = 'light') -> None:
+        """Open the page as in a new browser with a window of this width and this colour scheme."""
+        self.tab.set_viewport_size({'width': width, 'height': 950})
+        self.tab.emulate_media(color_scheme=scheme)
+        self.tab.goto(self.bench.post('/api/invite').json['address'])
+        if self.tab.evaluate('localStorage.length'):
+            self.tab.evaluate('localStorage.clear()')
+            self.tab.reload()
 
     def _hear(self, message: Any) -> None:
         # The browser tells of every request that was refused; the page says why.
