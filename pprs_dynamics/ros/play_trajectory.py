@@ -17,17 +17,15 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
-from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, sampled, with_lead_in
 from pprs_dynamics.physics.model.keys import is_described
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.parameters import (
-    current_values,
-    declare_model,
     declare_node_parameters,
+    declared_model,
     node_parameter,
     overrides,
     refuse_unknown,
@@ -159,10 +157,7 @@ class Beats:
 def _joints(node: Node, values: dict[str, Any], arguments: Sequence[str],
             ) -> tuple[JointMotion, Callable[..., Any]]:
     """Return an excitation of the drives of the node's model, and what writes its messages."""
-    declare_model(node, arguments)
-    given = current_values(node)
-    model = DriveModel.from_parameters({
-        name: given[name] for name in given.keys() - values.keys()})
+    model = declared_model(node, arguments, values)
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
     # One step beyond the end, which is where it began, at rest.
     motion = JointMotion(*(np.concatenate((each, each[:1])) for each in (
@@ -176,11 +171,10 @@ def _path(values: dict[str, Any]) -> PlatformMotion:
             raise ModelError('file', '', 'be a CSV of poses where source is csv')
         motion = read_poses(values['file'], values['rate'])
     else:
-        path: HelicalPath | Excitation = HelicalPath()
-        if values['source'] == EXCITATION:
-            path = Excitation(duration=values['duration'], seed=values['seed'])
+        path = (Excitation(duration=values['duration'], seed=values['seed'])
+                if values['source'] == EXCITATION else HelicalPath())
         # One step beyond the end, held there: the last message is the pose at rest.
-        motion = path.motion(np.arange(0.0, path.duration + 1 / values['rate'], 1 / values['rate']))
+        motion = sampled(path, values['rate'], beyond=1)
     if values['repeat'] != 1 and not motion.is_closed():
         raise ModelError('repeat', values['repeat'],
                          'be 1 for a path that does not end where it starts')

@@ -24,8 +24,8 @@ from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import watch_parameters
 from pprs_dynamics.ros.node.parameters import (
     current_values,
-    declare_model,
     declare_node_parameters,
+    declared_model,
     node_parameter,
 )
 from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
@@ -81,10 +81,7 @@ class SimulatedRobotNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         node_values = declare_node_parameters(self, PARAMETERS)
-        declare_model(self, arguments_of(options))
-        values = {name: value for name, value in current_values(self).items()
-                  if name not in node_values}
-        self._model = DriveModel.from_parameters(values)
+        self._model = declared_model(self, arguments_of(options), node_values)
         self._names = RobotNames.of(self._model)
         self._use_effort = node_values['use_effort']
         self._robot = _simulated(self._model, node_values)

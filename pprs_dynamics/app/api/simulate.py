@@ -22,7 +22,7 @@ from pprs_dynamics.drives import DriveUnits, common_unit
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.mechanism.paths import Excitation, sampled
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.system.plain_text import counted
@@ -159,8 +159,9 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         nominal = draw_motion(robot, duration, 0) if path_seed else None
     else:
         if path_seed or motion is not None:
-            nominal = _of_drives(found, _excitation(duration, 0))
-        motion = _excitation(duration, path_seed) if motion is None else motion
+            nominal = _of_drives(found, sampled(Excitation(duration=duration), RATE))
+        if motion is None:
+            motion = sampled(Excitation(duration=duration, seed=path_seed), RATE)
         drives = _of_drives(found, motion)
     run = simulate_mechanism(
         robot, names, seed, noise=noise, duration=duration, path_seed=path_seed,
@@ -171,11 +172,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
                                       found.drives, run.channels)
     return SimulationResult(found, recording, run.effects, motion or run.motion,
                             round(1 / float(np.median(np.diff(time))), 6), seed)
-
-
-def _excitation(duration: float, seed: int) -> PlatformMotion:
-    path = Excitation(duration=duration, seed=seed)
-    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
 
 
 def _of_drives(model: DriveModel, motion: PlatformMotion) -> JointMotion:

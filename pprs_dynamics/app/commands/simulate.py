@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import argparse
 
-import numpy as np
-
 from pprs_dynamics.app.api.simulate import RATE, simulate
 from pprs_dynamics.app.commands.arguments import (
     UsageError,
@@ -23,7 +21,7 @@ from pprs_dynamics.app.commands.arguments import (
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.mechanism.paths import HelicalPath, sampled
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.injection import NAMES, RANDOM
@@ -78,5 +76,4 @@ def _motion(options: argparse.Namespace, model: DriveModel) -> PlatformMotion | 
                          f'{model.title}: only a 3-PPRS follows poses of its platform')
     if options.path != 'helix':
         return read_poses(options.path).resampled(RATE)
-    path = HelicalPath()
-    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
+    return sampled(HelicalPath(), RATE)

@@ -17,7 +17,6 @@ from typing import Any, Generic, TypeVar
 from pprs_dynamics.app.api.next_experiment import ExperimentResult, next_experiment
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
-from pprs_dynamics.app.workbench.view_state import names_of
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
@@ -177,7 +176,7 @@ class Jobs:
             ticks.require(revision)
             tick, fits = ticks.view.ticks.get(effect), ticks.fits
             request = EffectRequest.named(
-                effect, names_of(tick.best, fits.drives) if tick else None,
+                effect, fits.design.named(tick.best.drives) if tick else None,
                 fits.drives).placed(ticks.model)
             last = self.of_kind.get('adopt')
             if last is not None and last.is_running:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pprs_dynamics.app.report.charts import extremes
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
-from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
+from pprs_dynamics.app.workbench.view_state import Share, ViewState
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.physics.model.skeleton import Skeleton
@@ -107,7 +107,7 @@ def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
         after = float(np.sum(offer.residual[chosen] ** 2, dtype=float))
         explained = 1 - after / left if left > 0 else 0.0
         paid = max(offer.evidence, 0.0) / offer.gain if offer.gain > 0 else 0.0
-        shares.append(Share(offer.candidate.name, names_of(offer.candidate, fits.drives),
+        shares.append(Share(offer.candidate.name, fits.design.named(offer.candidate.drives),
                             explained, explained * paid))
     return sorted(shares, key=lambda share: (-share.net, -share.explained))
 

@@ -139,7 +139,7 @@ class Session:
                 'drives': list(fits.drives),
                 'errors': {name: error.to_dict() for name, error in self.errors().items()},
                 'overall': self.overall().to_dict(), **view_state.units_to_dict(model),
-                'effects': [view_state.effect_to_dict(view, effect, model, reported)
+                'effects': [view_state.effect_to_dict(view, effect, fits, reported)
                             for effect in fits.candidates()],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'reference': None if fits.since is None else {

@@ -97,7 +97,7 @@ class Ticks:
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):
                     self._tick(EffectRequest.named(
-                        name, view_state.names_of(tick.best, fits.drives), fits.drives).placed(
+                        name, fits.design.named(tick.best.drives), fits.drives).placed(
                             fits.model), tick.chosen)
             self.notify()
 

@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.sentences import word_terms
-from pprs_dynamics.inference.search.candidates import CandidateSet, CostTerms, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -196,7 +196,7 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
     return fits.held(shaped, list(ticks.values()))
 
 
-def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
+def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], fits: TickFits,
                    called_for: Set[str] | None) -> dict[str, Any]:
     """Return all that is shown of one effect.
 
@@ -204,11 +204,10 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
     ----------
     view : ViewState
     effect : type of CatalogueEffect
-    model : DriveModel
+    fits : TickFits
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
-    drives = model.drives
     tick = view.ticks.get(effect.name)
     offer = next((offer for offer in view.offers if offer.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
@@ -216,7 +215,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
     evidence = without.total if without else offer.evidence if offer and not tick else None
     return {
         'name': effect.name, 'is_ticked': tick is not None,
-        'drives': None if candidate is None else names_of(candidate, drives),
+        'drives': candidate and fits.design.named(candidate.drives),
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
         'evidence_terms': '' if without is None else word_terms(without),
         'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
@@ -224,7 +223,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
         'is_called_for': called_for is not None and effect.name in called_for,
         'is_judged': called_for is not None,
         **asdict(effect.card),
-        'parameters': _parameters(view, effect, model) if tick else []}
+        'parameters': _parameters(view, effect, fits) if tick else []}
 
 
 def units_to_dict(model: DriveModel) -> dict[str, Any]:
@@ -235,12 +234,10 @@ def units_to_dict(model: DriveModel) -> dict[str, Any]:
         for drive, unit in zip(model.drives, model.units, strict=True)}}
 
 
-def _parameters(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
+def _parameters(view: ViewState, effect: type[CatalogueEffect], fits: TickFits,
                 ) -> list[dict[str, Any]]:
-    drives = model.drives
-    units = dict(zip(drives, model.units, strict=True))
-    tick = view.ticks[effect.name]
-    chosen = {name if d is None else f'{drives[d]}.{name}' for d, name in tick.chosen}
+    units = dict(zip(fits.drives, fits.model.units, strict=True))
+    chosen = {fits.key(*place) for place in view.ticks[effect.name].chosen}
     known = {parameter.name: parameter for parameter in effect.parameters}
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
@@ -274,12 +271,6 @@ def recordings_to_dict(recordings: Mapping[str, Recording], fits: TickFits, now:
             'now': finite(root_mean_square(now[part])),
             'findings': [finding.text for finding in recording.findings]})
     return found
-
-
-def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, ...] | None:
-    """Return the names of the drives that a candidate sits on; None for the structure."""
-    on = candidate.drives
-    return None if on is None else tuple(drives[d] for d in on)
 
 
 def errors_of(fits: TickFits, view: ViewState, noise: Mapping[str, float],

@@ -64,6 +64,11 @@ def _helix_angle(t: Array) -> tuple[Array, Array, Array]:
     return angle, rate, gain
 
 
+def sampled(path: HelicalPath | Excitation, rate: float, beyond: int = 0) -> PlatformMotion:
+    """Return the motion along a path at a rate [Hz], with some samples at rest beyond its end."""
+    return path.motion(np.arange(0.0, path.duration + beyond / rate, 1 / rate))
+
+
 def with_lead_in(motion: PlatformMotion, duration: float, rate: float) -> PlatformMotion:
     """Return a motion that goes from the home pose to where another starts, and then plays it.
 

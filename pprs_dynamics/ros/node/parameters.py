@@ -10,7 +10,7 @@ is no wheel of it.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import find_parameter
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ANY,
     DRIVES_KEY,
@@ -172,6 +173,19 @@ def declare_model(node: Node, arguments: Sequence[str]) -> None:
         # The ledger is for `pprs history`: a page of numbers that no node reads.
         if not node.has_parameter(name) and not name.startswith(HISTORY):
             node.declare_parameter(name, value, _added_descriptor(name), ignore_override=True)
+
+
+def declared_model(node: Node, arguments: Sequence[str], own: Container[str]) -> DriveModel:
+    """Declare every key of a node's model, and return the model; `own` are the node's parameters.
+
+    Raises
+    ------
+    ModelError
+        As `declare_model`.
+    """
+    declare_model(node, arguments)
+    return DriveModel.from_parameters({name: value for name, value in current_values(node).items()
+                                       if name not in own})
 
 
 def _declare(node: Node, key: Key, value: Any) -> None:
