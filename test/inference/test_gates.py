@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -80,6 +82,8 @@ def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() ->
     assert case.objections(sure, (1.0, 0.9), 'the recordings', 'N') == ()
     # Of a wrist that gains and a slide that hardly loses the sum in newtons or newton metres rises.
     assert case.objections(sure, (141.9, 141.91), 'the recordings', 'N or N m') == ()
+    # Of several effects in joint values the error over all drives falls with the last.
+    assert replace(case, is_alone=False).objections(sure, (1.0, 1.2), 'the recordings', 'N') == ()
     said, = case.objections(unsure, (1.0, 0.9), 'the recordings', 'N')
     assert 'falls from 1 N to 0.9 N, by 0.5 standard errors' in said
 

@@ -3,8 +3,10 @@
 
 """Adding an effect to a model: its row of the table, the held-out test, and the decision.
 
-The values are those of the diagnosis: of the best row that has the effect. The error that is
-printed decides: it must fall, on the recordings and on held-out data, by more than its uncertainty.
+The values are those of the diagnosis: of the best row that has the effect. The error must fall, on
+the recordings and on held-out data, drive by drive in units of the noise and by more than its
+uncertainty. Of one effect alone the error over all drives, which is printed, must fall as well. Of
+several effects in the values that they have together, that error may fall with the last one only.
 """
 
 from __future__ import annotations
@@ -60,7 +62,7 @@ def adopt(
     model: DriveModel, request: EffectRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
-    reference: Reference | None = None, beside: Sequence[FoundEffect] = (),
+    reference: Reference | None = None, beside: Sequence[FoundEffect] | None = None,
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
 
@@ -83,7 +85,7 @@ def adopt(
     reference : Reference, optional
         Since which the effect is a change. Errors are then those in addition to its errors.
     beside : sequence of FoundEffect, optional
-        Effects of the diagnosis that `model` has already.
+        Effects of the diagnosis that `model` has already, where all are adopted; None: one alone.
 
     Raises
     ------
@@ -102,22 +104,20 @@ def adopt(
     if diagnosis is None or not (diagnosis.selection or request.variable):
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSED * share),
                              reference=reference)
-    case = _Case(model, recordings, validate, diagnosis, reference)
+    case = _Case(model, recordings, validate, diagnosis, reference, is_alone=beside is None)
     if request.variable:
         found = _with_curve(case, request, report)
     else:
         try:
-            found = _with_effect(case, request, beside)
+            found = _with_effect(case, request, beside or ())
         except (ModelError, EffectRequestError) as error:
             force = False
             found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
-    fall = change(found.held_out_before, found.held_out_after, found.unit)
     reason = '. '.join(text[:1].upper() + text[1:] if number else text
-                       for number, text in enumerate(found.objections)
-                       ) or f'the error on {case.held_out} {fall}'
+                       for number, text in enumerate(found.objections)) or found.reason
     remarks = (*found.remarks, WEAK) if is_sure and not validate else found.remarks
     return replace(found, adopted=is_sure or force, reason=reason, remarks=remarks)
 
@@ -143,6 +143,7 @@ class _Case:
     validate: Sequence[Recording]
     diagnosis: Diagnosis
     reference: Reference | None
+    is_alone: bool = True
 
     @property
     def held_out(self) -> str:
@@ -182,7 +183,7 @@ class _Case:
         before, after = errors
         said = f'the error on {where} {change(before, after, unit)}'
         # Newtons and newton metres have no sum: there each drive is judged by itself.
-        if not after < before and unit in EFFORT_UNITS:
+        if self.is_alone and not after < before and unit in EFFORT_UNITS:
             return (said,)
         if gain.confirms(asked):
             return ()
@@ -222,12 +223,25 @@ class _Case:
                                 before.unit)
                 or self.objections(gain, held_out, self.held_out, before.unit))
         first, last = held_out or errors
+        fall = change(first, last, before.unit)
+        if gain is not None and not last < first:
+            fall = (f'falls by {in_standard_errors(gain)}, weighted by the noise; the unweighted '
+                    f'error {fall}')
         return Adoption(**{
             'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
             'residuals_before': before, 'residuals_after': with_it, 'held_out_before': first,
             'held_out_after': last, 'held_out_on': VALIDATION if self.validate else BLOCKS,
             'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
+            'reason': f'the error on {self.held_out} {fall}',
             'reference': () if self.reference is None else self.reference.names, **details})
+
+
+def in_standard_errors(gain: PredictiveGain) -> str:
+    """Return the gain of all drives together, or of one drive where that is surer, in words."""
+    drive = max(gain.by_drive, key=lambda name: gain.by_drive[name])
+    if gain.certainty >= gain.by_drive[drive]:
+        return f'{gain.certainty:.2g} standard errors'
+    return f'{gain.by_drive[drive]:.2g} standard errors on {drive}'
 
 
 # An effect of the catalogue
