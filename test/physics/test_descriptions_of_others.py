@@ -249,6 +249,10 @@ def test_bodies_that_cannot_be_are_told_and_those_that_can_are_not(tmp_path: Pat
     assert 'upper has 8e+04 kg m^2 in 5 kg' in millimetres
     assert '126 m in a robot that reaches 0.4 m' in millimetres
     assert '0.08 kg m^2' in millimetres
+    slide = ('<link name="carriage"/><joint name="slide" type="prismatic"><parent link="upper"/>'
+             '<child link="carriage"/><limit lower="0" upper="4" effort="9" velocity="1"/></joint>')
+    assert one_link(tmp_path, (1.0, 80.0, 80.0)).faults
+    assert one_link(tmp_path, (1.0, 80.0, 80.0), slide).faults == ()
 
 
 def test_loops_that_only_a_model_file_can_have_are_refused(tmp_path: Path) -> None:

@@ -162,8 +162,10 @@ def _transmission(element: ElementTree.Element) -> Transmission:
 
 def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -> Iterator[str]:
     """Yield sentences on bodies whose inertia no body can have."""
-    reach = sum(float(np.linalg.norm(joint.frame.p)) for joint in joints.values()) + max(
-        (float(np.linalg.norm(p[1:4])) / p[0] for p in links.values() if p[0] > 0), default=0.0)
+    strokes = [joint.upper - joint.lower for joint in joints.values() if joint.kind == 'prismatic']
+    reach = (sum(float(np.linalg.norm(joint.frame.p)) for joint in joints.values()) + sum(strokes)
+             + max((float(np.linalg.norm(p[1:4])) / p[0] for p in links.values() if p[0] > 0),
+                   default=0.0))
     for name, parameters in links.items():
         if not parameters[0] > 0:
             if np.any(parameters):
