@@ -33,8 +33,7 @@ from pprs_dynamics.inference.experiments.next_experiment import (
 )
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
-    PresentCoefficient,
-    PresentShape,
+    PresentParameter,
     ReversalShape,
 )
 from pprs_dynamics.inference.regression.design import Design
@@ -136,8 +135,8 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
-    assert {type(effect) for effect in information.base} == {
-        ModelNumber, ReversalShape, PresentCoefficient, PresentShape}
+    assert {type(column) for column in information.base} == {
+        ModelNumber, ReversalShape, PresentParameter}
 
 
 def test_white_noise_counts_samples() -> None:

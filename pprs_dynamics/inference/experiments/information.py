@@ -30,8 +30,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
     ModelNumber,
-    PresentCoefficient,
-    PresentShape,
+    PresentParameter,
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
@@ -211,7 +210,7 @@ class Information:
         found = Sensitivities(self.model, self.given)
         found.is_planned = True
         found.restrict({column.effect for column in (*self.terms, *self.base) if isinstance(
-            column, (FittedTerm, PresentCoefficient, PresentShape))}
+            column, (FittedTerm, PresentParameter))}
             | {type(effect) for effect in self.given.effects
                if isinstance(effect, CatalogueEffect)})
         return found

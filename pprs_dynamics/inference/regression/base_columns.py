@@ -9,7 +9,7 @@ coefficient means for the model's values.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -29,6 +29,7 @@ from pprs_dynamics.physics.model.keys import set_number
 
 DIGITS = 6  # significant, of fitted values
 LARGEST_SHAPE_MOVE = 0.5  # of a shape parameter in one fit, as an amount of movement
+SMALL_STEP = 1e-3  # standard deviations, for derivatives by parameters of effects
 MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 
 
@@ -88,27 +89,39 @@ class ReferenceDirection(BaseColumn):
 
 
 @dataclass(frozen=True)
-class PresentCoefficient(BaseColumn):
-    """A coefficient of an effect that the given model has, per unit of its `scale`.
+class PresentParameter(BaseColumn):
+    """A parameter of an effect that the given model has; the coefficient counts deviations from it.
 
     Within what the model file says of how well it is known; more of a change is a hypothesis.
-    """
 
-    effect: type[CatalogueEffect]
-    drive: str | None
-    coefficient: Parameter
-
-
-@dataclass(frozen=True)
-class PresentShape(BaseColumn):
-    """A shape parameter of an effect that the given model has, by its amount of movement.
-
-    Within its uncertainty, as a `PresentCoefficient`.
+    Parameters
+    ----------
+    deviation : float
+        Its standard deviation; of a shape parameter as an amount of movement.
     """
 
     effect: type[CatalogueEffect]
     drive: str | None
     parameter: Parameter
+    deviation: float
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether forces are not linear in it."""
+        return self.parameter in self.effect.shape
+
+    def moved(self, values: Mapping[str, float], coefficient: float) -> dict[str, float]:
+        """Return parameters of the effect with this one moved by a coefficient."""
+        p, step = self.parameter, coefficient * self.deviation
+        value = values.get(p.name, p.default or 0.0)
+        return {**values, p.name: p.moved(value, float(np.clip(
+            step, -LARGEST_SHAPE_MOVE, LARGEST_SHAPE_MOVE))) if self.is_shape else value + step}
+
+    def slopes(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the derivatives of the effect's coefficients by the coefficient of the column."""
+        after, before = (self.effect.to_coefficients(at) for at in (
+            self.moved(values, SMALL_STEP), values))
+        return {name: (after[name] - before[name]) / SMALL_STEP for name in before}
 
 
 def rounded(value: float) -> float:
@@ -129,40 +142,28 @@ def units_of(model: DriveModel, drive: str | int | None) -> DriveUnits:
     return model.units[model.drives.index(drive) if isinstance(drive, str) else drive]
 
 
-def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficients: Array) -> None:
-    """Put known numbers as coefficients have them into a model's values."""
-    for column, c in zip(base, coefficients, strict=True):
-        if isinstance(column, ModelNumber):
-            set_number(values, column.number.key, column.number.element, column.value(float(c)))
-
-
-def move_present(values: dict[str, Any], given: DriveModel, base: Sequence[BaseColumn],
+def move_numbers(values: dict[str, Any], given: DriveModel, base: Sequence[BaseColumn],
                  coefficients: Array) -> None:
-    """Put the given model's effects as coefficients have them into a model's values."""
+    """Put numbers and effects of the given model as coefficients have them into its values."""
     moves: dict[tuple[type[CatalogueEffect], str | None],
-                list[tuple[PresentCoefficient | PresentShape, float]]] = {}
-    for column, c in zip(base, coefficients, strict=True):
-        if isinstance(column, (PresentCoefficient, PresentShape)):
-            moves.setdefault((column.effect, column.drive), []).append((column, float(c)))
-    for effect in given.effects:
-        for (kind, drive), found in moves.items():
-            if kind is not type(effect):
-                continue
-            block = present_values(effect, drive)
-            linear = kind.to_coefficients(block)
-            shape = {p.name: block[p.name] for p in kind.shape}
-            for column, c in found:
-                if isinstance(column, PresentCoefficient):
-                    linear[column.coefficient.name] += c * column.coefficient.scale
-                else:
-                    p = column.parameter
-                    shape[p.name] = p.moved(shape[p.name], float(np.clip(
-                        c, -LARGEST_SHAPE_MOVE, LARGEST_SHAPE_MOVE)))
-            every = {**kind.from_coefficients(linear), **shape}
-            prefix = f'effects.{kind.name}.' + (f'{drive}.' if drive else '')
-            for parameter in kind.parameters:
-                values[prefix + parameter.name] = within(parameter, every[parameter.name],
-                                                         units_of(given, drive))
+                list[tuple[PresentParameter, float]]] = {}
+    for column, c in zip(base, coefficients.tolist(), strict=True):
+        if isinstance(column, ModelNumber):
+            set_number(values, column.number.key, column.number.element, column.value(c))
+        elif isinstance(column, PresentParameter):
+            moves.setdefault((column.effect, column.drive), []).append((column, c))
+    for (kind, drive), found in moves.items():
+        there = present_values(next(e for e in given.effects if type(e) is kind), drive)
+        linear, shape = kind.to_coefficients(there), {}
+        for column, c in found:
+            if column.is_shape:
+                shape[column.parameter.name] = column.moved(there, c)[column.parameter.name]
+            for name, slope in column.slopes(there).items():
+                linear[name] += c * slope
+        every = {**there, **kind.from_coefficients(linear), **shape}
+        prefix = f'effects.{kind.name}.' + (f'{drive}.' if drive else '')
+        values.update({prefix + p.name: within(p, every[p.name], units_of(given, drive))
+                       for p in kind.parameters if p.name in there})
 
 
 def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, float]:
@@ -174,51 +175,22 @@ def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, f
     return effect.values
 
 
-def _coefficient_deviations(effect: CatalogueEffect, drive: str | None,
-                            known: Mapping[str, float]) -> dict[str, float]:
-    """Return the standard deviations of an effect's coefficients by those of its parameters.
-
-    Parameters
-    ----------
-    effect : CatalogueEffect
-    drive : str or None
-    known : mapping of str to float
-        Standard deviations by drive.parameter, or parameter; what is not there is exact.
-    """
-    kind, values = type(effect), present_values(effect, drive)
-    prefix = f'{drive}.' if drive else ''
-    here = kind.to_coefficients(values)
-    variances = dict.fromkeys(here, 0.0)
-    for parameter in kind.linear:
-        if std := known.get(prefix + parameter.name, 0.0):
-            moved = kind.to_coefficients({**values, parameter.name: values.get(
-                parameter.name, parameter.default or 0.0) + std})
-            for name, value in moved.items():
-                variances[name] += (value - here[name]) ** 2
-    return {name: variance ** 0.5 for name, variance in variances.items()}
-
-
 def present_columns(effect: CatalogueEffect, known: Mapping[str, float],
-                    ) -> list[PresentCoefficient | PresentShape]:
-    """Return what of an effect is uncertain, as columns without rows.
+                    ) -> Iterator[PresentParameter]:
+    """Yield what of an effect of the given model is uncertain, as columns without rows.
 
     Parameters
     ----------
     effect : CatalogueEffect
-        Of the given model.
     known : mapping of str to float
         Standard deviations by drive.parameter, or parameter; what is not there is exact.
     """
-    kind, found = type(effect), list[PresentCoefficient | PresentShape]()
+    kind = type(effect)
     for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):
-        deviations = _coefficient_deviations(effect, drive, known)
-        found += [PresentCoefficient({}, (c.scale / deviations[c.name]) ** 2, kind, drive, c)
-                  for c in kind.coefficients if deviations[c.name] > 0]
-        for p in kind.shape:
-            if std := known.get(f'{drive}.{p.name}', 0.0):
-                amount = p.amount(std, present_values(effect, drive)[p.name])
-                found.append(PresentShape({}, amount ** -2, kind, drive, p))
-    return found
+        for p in kind.parameters:
+            if std := known.get(f'{drive}.{p.name}' if drive else p.name, 0.0):
+                yield PresentParameter({}, 1.0, kind, drive, p, p.amount(
+                    std, present_values(effect, drive)[p.name]) if p in kind.shape else std)
 
 
 @dataclass(frozen=True)

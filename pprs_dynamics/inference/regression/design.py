@@ -23,11 +23,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
+    SMALL_STEP,
     BaseColumn,
     CarriedOver,
     ModelNumber,
-    PresentCoefficient,
-    PresentShape,
+    PresentParameter,
     ReferenceDirection,
     ReversalShape,
     present_columns,
@@ -188,9 +188,8 @@ class Design:
             term = design.find_term(effect.effect, effect.drive, effect.shape)
             if issubclass(effect.effect, AddedBody) and self.present(effect.effect, None) is None:
                 term = replace(term, rows=effect.effect.around(term.rows, effect.coefficients))
-            weights = np.array([effect.coefficients[name] for name in term.names] or [1.0])
-            for d, rows in term.rows.items():
-                shift[:, d] += weights @ rows
+            for d, force in term.force(effect.coefficients).items():
+                shift[:, d] += force
             for d, row in design.known_change(term).items():
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
@@ -645,23 +644,18 @@ class Design:
                 slopes[d].append(change / SHAPE_STEP)
         return {d: np.stack(rows) for d, rows in slopes.items()}
 
-    def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
+    def present_rows(self, column: PresentParameter) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
         there = next(e for e in self.model.effects if e.name == column.effect.name)
         assert isinstance(there, CatalogueEffect)
-        values = present_values(there, column.drive)
         drive = None if column.drive is None else self.drives.index(column.drive)
-        term = self.find_term(column.effect, drive,
-                              {p.name: values[p.name] for p in column.effect.shape})
-        if isinstance(column, PresentCoefficient):
-            at = term.names.index(column.coefficient.name)
-            return {d: rows[at] * column.coefficient.scale for d, rows in term.rows.items()
-                    if np.any(rows[at])}
-        assert drive is not None
-        weights = there.to_coefficients(values)
-        slopes = self.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
-        at = column.effect.shape.index(column.parameter)
-        return {d: rows[at] for d, rows in slopes.items()}
+        values = present_values(there, column.drive)
+        moved = column.moved(values, SMALL_STEP)
+        before, after = (self.find_term(column.effect, drive, {
+            p.name: at[p.name] for p in column.effect.shape}).force(
+                there.to_coefficients(at)) for at in (values, moved))
+        rows = {d: (after[d] - force) / SMALL_STEP for d, force in before.items()}
+        return {d: row for d, row in rows.items() if np.any(row)}
 
 
 def searched_in_drives(design: Design) -> list[type[DriveEffect]]:

@@ -52,6 +52,11 @@ class Term:
             bare=None if self.bare is None else {d: rows * course
                                                  for d, rows in self.bare.items()})
 
+    def force(self, coefficients: Mapping[str, float]) -> dict[int, Array]:
+        """Return the force of coefficients by name, (M,) by drive [N]."""
+        weights = np.array([coefficients[name] for name in self.names] or [1.0])
+        return {d: weights @ rows for d, rows in self.rows.items()}
+
     @property
     def names(self) -> tuple[str, ...]:
         """Coefficients of the rows; none where the only row has the coefficient 1."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,8 +14,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
-    PresentCoefficient,
-    PresentShape,
+    PresentParameter,
     present_values,
     units_of,
     within,
@@ -281,25 +280,29 @@ def _covariance(fits: FittedSets, fit: JointFit, component: Component, size: int
     weights = np.zeros((size, len(fit.coefficients)))
     weights[np.arange(len(index)), index] = 1.0
     first = max(len(component.names), 1 if index else 0)
-    for k, column in _present_at(fits, component):
-        if isinstance(column, PresentShape):
+    for k, column, values in _present_at(fits, component):
+        if column.is_shape:
             at = first + component.effect.shape.index(column.parameter)
             if at < size:
-                weights[at, k] = 1.0
-        elif column.coefficient.name in component.names:
-            weights[component.names.index(column.coefficient.name), k] = column.coefficient.scale
+                weights[at, k] = column.deviation
+        else:
+            slopes = column.slopes(values)
+            weights[:len(component.names), k] = [slopes[name] for name in component.names]
     found: Array = weights @ fit.covariance @ weights.T
     return found
 
 
 def _present_at(fits: FittedSets, component: Component,
-                ) -> Iterator[tuple[int, PresentCoefficient | PresentShape]]:
-    """Yield the base columns, with their places, of what the given model has of a component."""
+                ) -> Iterator[tuple[int, PresentParameter, Mapping[str, float]]]:
+    """Yield the base columns, with their places, of what the given model has of a component.
+
+    And all parameters that it has of it.
+    """
     name = None if component.drive is None else fits.design.drives[component.drive]
     for k, column in enumerate(fits.design.base):
-        if (isinstance(column, (PresentCoefficient, PresentShape))
+        if (isinstance(column, PresentParameter)
                 and (column.effect, column.drive) == (component.effect, name)):
-            yield k, column
+            yield k, column, fits.design.present(component.effect, component.drive) or {}
 
 
 def _of_component(
@@ -358,12 +361,13 @@ def _moved(fits: FittedSets, component: Component, coefficients: Array) -> Compo
     """Return a component with what the given model has of it as base columns move it."""
     if not component.given:
         return component
-    base = {column.coefficient.name: float(coefficients[k]) * column.coefficient.scale
-            for k, column in _present_at(fits, component)
-            if isinstance(column, PresentCoefficient)}
-    return replace(component, given=tuple(
-        given + base.get(p.name, 0.0) for given, p in zip(
-            component.given, component.effect.coefficients, strict=True)))
+    given = np.array(component.given)
+    for k, column, values in _present_at(fits, component):
+        if not column.is_shape:
+            slopes = column.slopes(values)
+            given += coefficients[k] * np.array([slopes[c.name]
+                                                 for c in component.effect.coefficients])
+    return replace(component, given=tuple(given.tolist()))
 
 
 def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Estimate]:

@@ -15,7 +15,6 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
     ReversalShape,
     move_numbers,
-    move_present,
     units_of,
     within,
 )
@@ -52,8 +51,7 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Dr
         For values that no model may have.
     """
     values: dict[str, Any] = dict(design.given.values)
-    move_numbers(values, design.base, base)
-    move_present(values, design.given, design.base, base)
+    move_numbers(values, design.given, design.base, base)
     names = list(values.get('effects.active', []))
     for effect in effects:
         kind = effect.effect
