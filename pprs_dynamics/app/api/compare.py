@@ -267,7 +267,8 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         as_it_is=as_it_is).require_recordings()
     measuring = stage(progress, 'motion and model')
     columns, residuals, notes = measure_columns(inputs.model, inputs.fitted, measuring)
-    where = localise(residuals, progress=stage(progress, 'where it fails'))
+    where = localise(columns.design.residuals if columns else residuals,
+                     stage(progress, 'where it fails'))
     comparison = compare_residuals(
         residuals, where,
         noise_floors(columns, residuals.period) if columns else {},

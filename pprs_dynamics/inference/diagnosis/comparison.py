@@ -34,7 +34,6 @@ from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.parallel import each
 from pprs_dynamics.system.plain_text import for_json
 
-MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
 PROPOSALS = 4  # fitted in full, of each scan
@@ -65,25 +64,24 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
     Parameters
     ----------
     residuals : Residuals
-        Averaged to at most 16 000 samples first; what is faster than that is not seen.
+        Of as much of recordings as a search holds in memory.
     progress : callable, optional
         Called with the share of the work that is done.
     """
-    thin = residuals.thinned(MOST_SAMPLES)
     statements: list[Statement] = []
     noise: dict[str, NoiseSpectrum] = {}
     done: list[int] = []
 
     def search_drive(drive: int) -> None:
-        found = _search(thin, drive)
+        found = _search(residuals, drive)
         if found is not None:
             statements.extend(found[0])
-            noise[thin.drives[drive]] = found[1]
+            noise[residuals.drives[drive]] = found[1]
         done.append(drive)
         if progress:
-            progress(len(done) / len(thin.drives))
+            progress(len(done) / len(residuals.drives))
 
-    each(search_drive, range(len(thin.drives)))
+    each(search_drive, range(len(residuals.drives)))
     return Localisation(tuple(sorted(
         statements, key=lambda statement: -statement.evidence)), noise)
 

@@ -124,6 +124,27 @@ class PresentParameter(BaseColumn):
         return {name: (after[name] - before[name]) / SMALL_STEP for name in before}
 
 
+def force_of(base: Sequence[BaseColumn], coefficients: Array, shape: tuple[int, ...],
+             of: Callable[[BaseColumn], bool]) -> Array:
+    """Return what some base columns add to the forces with coefficients, in the shape (M, D) [N].
+
+    Parameters
+    ----------
+    base : sequence of BaseColumn
+    coefficients : (P,) array
+        Of the base columns first.
+    shape : tuple of int
+    of : callable
+        Whether a column counts.
+    """
+    force = np.zeros(shape)
+    for column, c in zip(base, coefficients, strict=False):
+        if of(column):
+            for d, row in column.rows.items():
+                force[:, d] += c * row
+    return force
+
+
 def rounded(value: float) -> float:
     """Return a fitted value with the digits that a model file gets."""
     return float(f'{value:.{DIGITS}g}')

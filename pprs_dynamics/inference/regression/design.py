@@ -30,6 +30,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     PresentParameter,
     ReferenceDirection,
     ReversalShape,
+    force_of,
     present_columns,
     present_values,
 )
@@ -48,7 +49,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     stacked_columns,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
-from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
+from pprs_dynamics.inference.residuals.measuring import join_tables, progress_of, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
     misread,
@@ -155,15 +156,10 @@ class Design:
         progress : callable, optional
             Called with the share that is done.
         """
-        report = progress or (lambda share: None)
-        reconstructions = []
-        for k, recording in enumerate(recordings):
-            def followed(done: int, total: int, k: int = k) -> None:
-                report(0.5 * (k + done / total) / len(recordings))
-
-            reconstructions.append(reconstruct(model, recording, followed))
-        return cls._evaluated(model, model, tuple(reconstructions),
-                              lambda share: report(0.5 + 0.5 * share))
+        report, parts = progress or (lambda share: None), 2 * len(recordings)
+        return cls._evaluated(model, model, tuple(
+            reconstruct(model, recording, progress_of(report, k, parts))
+            for k, recording in enumerate(recordings)), report)
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.
@@ -175,15 +171,13 @@ class Design:
             Nothing is to be added to its effects: others outside the drives get no columns.
         """
         design = self._evaluated(
-            point.model, self.given, self.reconstructed(point.model), None,
-            {effect.effect for effect in point.effects} if alone else None,
-            {(column.drive, column.number) for column in self.base
-             if isinstance(column, ReversalShape)}, self._unmoved(point)).beside(self.carried)
-        shift = np.zeros_like(design.residuals.model)
-        for column, c in zip(design.base, point.base, strict=True):
-            if column.in_model:
-                for d, row in column.rows.items():
-                    shift[:, d] += c * row
+            point.model, self.given, self.reconstructed(point.model),
+            effects={effect.effect for effect in point.effects} if alone else None,
+            reversals={(column.drive, column.number) for column in self.base
+                       if isinstance(column, ReversalShape)},
+            known=self._unmoved(point)).beside(self.carried)
+        shift = force_of(design.base, point.base, design.residuals.model.shape,
+                         lambda column: column.in_model)
         for effect in point.effects:
             term = design.find_term(effect.effect, effect.drive, effect.shape)
             if issubclass(effect.effect, AddedBody) and self.present(effect.effect, None) is None:
@@ -271,12 +265,8 @@ class Design:
         coefficients : (P,) array
             Of the base columns first.
         """
-        forces = np.zeros_like(self.residuals.model)
-        for column, c in zip(self.base, coefficients, strict=False):
-            if isinstance(column, ReferenceDirection):
-                for d, row in column.rows.items():
-                    forces[:, d] += c * row
-        return forces
+        return force_of(self.base, coefficients, self.residuals.model.shape,
+                        lambda column: isinstance(column, ReferenceDirection))
 
     def reconstructed(self, model: DriveModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings by a model's encoders."""
@@ -292,7 +282,7 @@ class Design:
     @classmethod
     def _evaluated(cls, model: DriveModel, given: DriveModel,
                    reconstructions: tuple[Reconstruction, ...],
-                   progress: Callable[[float], None] | None,
+                   report: Callable[[float], None] = lambda share: None,
                    effects: Container[type[CatalogueEffect]] | None = None,
                    reversals: Container[tuple[int | None, int]] | None = None,
                    known: Mapping[str, Array] = MappingProxyType({}),
@@ -303,7 +293,8 @@ class Design:
         ----------
         model, given : DriveModel
         reconstructions : tuple of Reconstruction
-        progress : callable, optional
+        report : callable, optional
+            Called with the share that is done; half of it is before.
         effects : container of type of CatalogueEffect, optional
             The only ones outside the drives that get columns; by default all.
         reversals : container of (int or None, int), optional
@@ -320,12 +311,9 @@ class Design:
         full: list[FullRate] = []
         notes: list[str] = []
         for k, reconstruction in enumerate(reconstructions):
-            def report(done: int, total: int, k: int = k) -> None:
-                if progress is not None:
-                    progress((k + done / total) / len(reconstructions))
-
             collector = ColumnCollector(sensitivities, reconstruction)
-            tables.append(treated_table(model, reconstruction, report, collector))
+            tables.append(treated_table(model, reconstruction, progress_of(
+                report, len(reconstructions) + k, 2 * len(reconstructions)), collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = {**known, **stacked_columns(tables)}

@@ -20,6 +20,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -34,9 +35,14 @@ class Variable:
     name: str
 
 
+def progress_of(report: Callable[[float], None], part: int, parts: int) -> Progress:
+    """Return what reports (done, all) of one of several equal parts as a share of the whole."""
+    return lambda done, total: report((part + done / max(total, 1)) / parts)
+
+
 def measure_residuals(
     model: DriveModel, recordings: Sequence[Recording],
-    progress: Callable[[float, float], None] | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Residuals, tuple[str, ...]]:
     """Return measured and modelled efforts of recordings side by side, and how, in words.
 
@@ -46,7 +52,7 @@ def measure_residuals(
     recordings : sequence of Recording
         One after the other, with a pause between; each segment stays one of its own.
     progress : callable, optional
-        Called with (done, total) now and then.
+        Called with the share that is done.
 
     Raises
     ------
@@ -59,19 +65,11 @@ def measure_residuals(
     """
     tables: list[dict[Any, Array]] = []
     notes: list[str] = []
-    total = 2.0 * sum(len(recording.time) for recording in recordings)
-    done = 0.0
-
-    def reporter(before: float) -> Callable[[float, float], None]:
-        def report(samples: float, _: float) -> None:
-            if progress is not None:
-                progress(before + samples, total)
-        return report
-    for recording in recordings:
-        reconstruction = reconstruct(model, recording, reporter(done))
-        done += len(recording.time)
-        tables.append(treated_table(model, reconstruction, reporter(done)))
-        done += len(recording.time)
+    parts = 2 * len(recordings)
+    for k, recording in enumerate(recordings):
+        reconstruction = reconstruct(model, recording, progress_of(progress, 2 * k, parts))
+        tables.append(treated_table(model, reconstruction,
+                                    progress_of(progress, 2 * k + 1, parts)))
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.
         del reconstruction
@@ -80,7 +78,7 @@ def measure_residuals(
 
 def treated_table(
     model: DriveModel, reconstruction: Reconstruction,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     more: Callable[[Any, Treatment], Mapping[Any, Array]] = lambda forces, treat: {},
 ) -> dict[Any, Array]:
     """Return the filtered signals of one recording that a comparison needs, by name.

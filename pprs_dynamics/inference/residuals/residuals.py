@@ -148,37 +148,6 @@ class Residuals:
                 stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
         return stretches
 
-    def thinned(self, samples: int) -> Residuals:
-        """Return means over blocks of equal length, of at most about `samples` samples.
-
-        Efforts, parts and variables are averaged alike. Samples that do not fill a block at
-        the end of a segment are left out; a block without a measurement stays NaN.
-        """
-        factor = -(-len(self) // samples)
-        if factor <= 1:
-            return self
-        parts = [slice(part.start, part.stop - (part.stop - part.start) % factor)
-                 for part in _runs(self.segment)]
-
-        def mean(array: Array) -> Array:
-            return np.concatenate([
-                array[part].reshape(-1, factor, *array.shape[1:]).mean(axis=1)
-                for part in parts])
-
-        known = np.isfinite(self.measured)
-        share = mean(known.astype(float))
-        total = mean(np.where(known, self.measured, 0.0))
-        # A mean over half a block is compared with the model's over the whole one; with fewer
-        # measurements the two would not be of the same time.
-        measured = np.where(share > 0.5, total / np.maximum(share, 0.5), np.nan)
-        segment, record = (np.concatenate([numbers[part][::factor] for part in parts])
-                           for numbers in (self.segment, self.record))
-        return Residuals(
-            self.drives, mean(self.time), segment, measured, mean(self.model),
-            {name: mean(part) for name, part in self.parts.items()},
-            {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
-            self.units, record)
-
 
 def rms(residuals: Residuals) -> float:
     """Return the root of the mean squared error over samples and drives, in `residuals.unit`."""

@@ -14,6 +14,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
     ReversalShape,
+    force_of,
     move_numbers,
     units_of,
     within,
@@ -101,11 +102,9 @@ def squared(fits: FittedSets, fitted: CandidateSet, forces: Array) -> float:
 def linear_prediction(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return the forces that the linear fit predicts, reversals as the model has them, (M, D)."""
     design = fits.design
-    prediction = design.residuals.model.copy()
-    for column, c in zip(design.base, fitted.fit.coefficients, strict=False):
-        if column.in_model:
-            for d, row in column.rows.items():
-                prediction[:, d] += c * row
+    prediction = design.residuals.model + force_of(
+        design.base, fitted.fit.coefficients, design.residuals.model.shape,
+        lambda column: column.in_model)
     for candidate in fitted.effects:
         prediction += fits.components.force(fitted, candidate, prediction.shape)
     return prediction
@@ -118,11 +117,9 @@ def linear_residual(fits: FittedSets, fitted: CandidateSet) -> Array:
 
 def reversal_forces(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return what friction that reverses in other widths than the model's changes, (M, D) [N]."""
-    found, fit = np.zeros_like(fits.design.residuals.model), fitted.fit
-    for column, c in zip(fits.design.base, fit.coefficients, strict=False):
-        if isinstance(column, ReversalShape):
-            for d, row in column.rows.items():
-                found[:, d] += c * row
+    fit, design = fitted.fit, fits.design
+    found = force_of(design.base, fit.coefficients, design.residuals.model.shape,
+                     lambda column: isinstance(column, ReversalShape))
     for blocks in fitted.nuisance.values():
         if REVERSAL in blocks:
             for d, rows in blocks[REVERSAL].rows.items():

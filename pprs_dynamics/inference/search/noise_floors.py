@@ -96,8 +96,7 @@ def measure_columns(
     piece = excerpts_within_memory(model, recordings)
     whole = None
     if any(excerpt is not other for excerpt, other in zip(piece, recordings, strict=True)):
-        whole = measure_residuals(model, recordings, lambda done, total: progress(
-            0.5 * done / total if total else 0.0))
+        whole = measure_residuals(model, recordings, lambda share: progress(0.5 * share))
     design = Design.of(model, piece, lambda share: progress(0.5 + 0.5 * share if whole else share))
     residuals, notes = whole or (design.residuals, design.notes)
     try:
