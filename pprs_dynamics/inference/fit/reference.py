@@ -33,11 +33,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_fit import base_numbers, base_prior, reconstructed
 from pprs_dynamics.inference.fit.repeating_forces import (
-    Integers,
     Process,
     States,
     Waves,

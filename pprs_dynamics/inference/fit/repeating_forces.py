@@ -19,10 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.residuals.residuals import Residuals
-
-Integers = np.typing.NDArray[np.int_]
 
 # States on which a process is conditioned, over all drives and over one, and further ones of
 # another recording.

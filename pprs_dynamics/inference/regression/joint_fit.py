@@ -23,13 +23,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array, Integers, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,
     NormalEquations,
+    Solution,
     term_gains,
 )
 from pprs_dynamics.inference.regression.terms import Term
@@ -37,7 +38,6 @@ from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands,
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
-Integers = np.typing.NDArray[np.int_]
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
@@ -52,32 +52,23 @@ MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
 @dataclass(frozen=True, eq=False)
-class JointFit:
+class JointFit(Solution):
     """A fit of blocks.
 
     Parameters
     ----------
     blocks : tuple of Block
-    coefficients : (P,) array
-        Of the base columns, then of the blocks in order.
-    covariance : (P, P) array
     amplitudes : (D, J + 1) array
         Of the noise spectra [N^2].
     spectra : (D, B) array
         At the bands [N^2].
-    deviance : float
-        See the module.
-    squares : (D, B) array
-        Sums of squares of the residual in the bands [N^2].
+    places : mapping of Block to slice
+        Of its coefficients.
     """
 
     blocks: tuple[Block, ...]
-    coefficients: Array
-    covariance: Array
     amplitudes: Array
     spectra: Array
-    deviance: float
-    squares: Array
     places: Mapping[Block, slice] = field(repr=False)
 
     def of(self, block: Block) -> Array:
@@ -232,11 +223,16 @@ class Regression:
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
         key = (d, acting)
-        found = self._equations.pop(key, None) or DriveEquations(self, d, acting)
+        found = self._equations.pop(key, None) or DriveEquations(
+            self.base_products[d], acting, self.products(acting, d))
         if len(self._equations) >= MOST_EQUATIONS:
             self._equations.pop(next(iter(self._equations)))  # not used for longest
         self._equations[key] = found
         return found
+
+    def system(self, blocks: Sequence[Block]) -> NormalEquations:
+        """Return the normal equations of blocks and the base columns."""
+        return NormalEquations(self.columns, self.base_index, blocks, self.equations)
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks with the base columns and the noise.
@@ -247,36 +243,32 @@ class Regression:
         start : (D, J + 1) array, optional
             Amplitudes of the noise to start from.
         """
-        system = NormalEquations(self, blocks)
-        shapes = self.noise_shapes
-        if start is None:
-            start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
-        amplitudes, spectra = start, shapes.spectra(start)
-        solution = system.solve(spectra, self.counts)
+        system, shapes = self.system(blocks), self.noise_shapes
+        found = self._solved(system, blocks, shapes.start(np.stack([
+            drive.squares for drive in system.drives]), self.counts) if start is None else start)
         last = np.inf
         for _ in range(MOST_ROUNDS - 1):
-            before = solution.deviance
-            amplitudes = shapes.fitted(
-                amplitudes, solution.squares, self.counts,
-                system.leverage(solution.covariance, spectra), NOISE_STEPS)
-            spectra = shapes.spectra(amplitudes)
-            solution = system.solve(spectra, self.counts)
-            change = abs(before - solution.deviance)
+            before = found.deviance
+            found = self._solved(system, blocks, shapes.fitted(
+                found.amplitudes, found.squares, self.counts,
+                system.leverage(found.covariance, found.spectra), NOISE_STEPS))
+            change = abs(before - found.deviance)
             # Changes fall as a geometric series: the next one is change^2 / last.
             if change < CONVERGED or (change < last and change ** 2 < CONVERGED * last / 2
                                       and change < NEARLY):
                 break
             last = change
-        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
-                        spectra, solution.deviance, solution.squares, system.places)
+        return found
 
     def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
         """Return the fit of blocks under given noise."""
-        system = NormalEquations(self, blocks)
+        return self._solved(self.system(blocks), blocks, amplitudes)
+
+    def _solved(self, system: NormalEquations, blocks: Sequence[Block], amplitudes: Array,
+                ) -> JointFit:
         spectra = self.noise_shapes.spectra(amplitudes)
-        solution = system.solve(spectra, self.counts)
-        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
-                        spectra, solution.deviance, solution.squares, system.places)
+        return JointFit(**vars(system.solve(spectra, self.counts)), blocks=tuple(blocks),
+                        amplitudes=amplitudes, spectra=spectra, places=system.places)
 
     def stated(self, fit: JointFit, blocks: Sequence[Block] = ()) -> JointFit:
         """Return a fit, or one with further blocks at its noise, with the reported covariance.
@@ -284,8 +276,7 @@ class Regression:
         See `NormalEquations.uncertainty`.
         """
         found = self.at((*fit.blocks, *blocks), fit.amplitudes) if blocks else fit
-        return replace(found, covariance=NormalEquations(self, found.blocks).uncertainty(
-            found.spectra))
+        return replace(found, covariance=self.system(found.blocks).uncertainty(found.spectra))
 
     def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:
         """Return a fit conditioned on the values (k,) of some coefficients, at its noise."""

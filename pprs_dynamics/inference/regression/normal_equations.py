@@ -10,17 +10,16 @@ K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.special import log_ndtr
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 
@@ -213,21 +212,6 @@ class Posterior:
     beyond: Array
 
 
-class Fitted(Protocol):
-    """What the equations need of a regression."""
-
-    columns: tuple[BaseColumn, ...]
-    drives: tuple[int, ...]
-    base_index: dict[int, np.typing.NDArray[np.int_]]
-    base_products: dict[int, Array]
-
-    def products(self, blocks: Sequence[Block], d: int) -> dict[tuple[Block, Block | None], Array]:
-        """Return band sums of products of rows of pairs of blocks on a drive; None: the base."""
-
-    def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
-        """Return those of a drive and the blocks that it feels."""
-
-
 class DriveEquations:
     """Band sums of one drive's columns with each other and with the error.
 
@@ -235,14 +219,16 @@ class DriveEquations:
 
     Parameters
     ----------
-    regression : Fitted
-    d : int
+    base : (B, K + 1, K + 1) array
+        Of the columns of the base and the error with each other.
     acting : sequence of Block
         With rows on the drive.
+    products : mapping of (Block, Block or None) to array
+        Of pairs of blocks, and of each with the base and the error (None).
     """
 
-    def __init__(self, regression: Fitted, d: int, acting: Sequence[Block]) -> None:
-        base = regression.base_products[d]
+    def __init__(self, base: Array, acting: Sequence[Block],
+                 products: Mapping[tuple[Block, Block | None], Array]) -> None:
         count, first = base.shape[0], base.shape[1] - 1
         size = first + sum(block.size for block in acting)
         gram = np.empty((count, size, size))
@@ -251,7 +237,7 @@ class DriveEquations:
         side[:, :first] = base[:, :-1, -1]
         places = dict(zip(acting, accumulate((block.size for block in acting), initial=first),
                           strict=False))
-        for (a, b), product in regression.products(acting, d).items():
+        for (a, b), product in products.items():
             rows = slice(places[a], places[a] + a.size)
             if b is None:
                 gram[:, rows, :first] = product[:, :, :-1]
@@ -281,9 +267,20 @@ class DriveEquations:
         return spent
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solution:
-    """What the normal equations give: see `JointFit` for the quantities."""
+    """A fit at some noise.
+
+    Parameters
+    ----------
+    coefficients : (P,) array
+        Of the base columns, then of the blocks in order.
+    covariance : (P, P) array
+    deviance : float
+        See `joint_fit`.
+    squares : (D, B) array
+        Sums of squares of the residual in the bands [N^2].
+    """
 
     coefficients: Array
     covariance: Array
@@ -292,23 +289,35 @@ class Solution:
 
 
 class NormalEquations:
-    """The normal equations of all drives."""
+    """The normal equations of all drives.
 
-    def __init__(self, regression: Fitted, blocks: Sequence[Block]) -> None:
-        self.prior = Prior.of(regression.columns, blocks)
-        place = len(regression.columns)
+    Parameters
+    ----------
+    columns : sequence of BaseColumn
+    base_index : mapping of drive to int array
+        Places of those that a drive feels.
+    blocks : sequence of Block
+    equations : callable
+        Returns those of a drive and the blocks that it feels.
+    """
+
+    def __init__(self, columns: Sequence[BaseColumn], base_index: Mapping[int, Integers],
+                 blocks: Sequence[Block],
+                 equations: Callable[[int, tuple[Block, ...]], DriveEquations]) -> None:
+        self.prior = Prior.of(columns, blocks)
+        place = len(columns)
         self.places: dict[Block, slice] = {}
         for block in blocks:
             self.places[block] = slice(place, place + block.size)
             place += block.size
         self.drives: list[DriveEquations] = []
-        self.indices: list[np.typing.NDArray[np.int_]] = []
-        self._pairs: list[np.typing.NDArray[np.int_]] = []  # of these, in a flat (P, P) array
+        self.indices: list[Integers] = []
+        self._pairs: list[Integers] = []  # of these, in a flat (P, P) array
         self._beyond: Array | None = None  # of the solution before
-        for d in regression.drives:
+        for d, index in base_index.items():
             acting = tuple(block for block in blocks if d in block.rows)
-            self.drives.append(regression.equations(d, acting))
-            self.indices.append(np.concatenate([regression.base_index[d], *(
+            self.drives.append(equations(d, acting))
+            self.indices.append(np.concatenate([index, *(
                 np.arange(self.places[block].start, self.places[block].stop) for block in acting)]))
             self._pairs.append(np.add.outer(place * self.indices[-1], self.indices[-1]).ravel())
 

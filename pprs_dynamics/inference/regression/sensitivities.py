@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment, bandwidth
@@ -389,7 +389,7 @@ class Samples:
     state: Any
     treat: Treatment
     sensors: Sequence[MeasurementEffect]
-    at: np.typing.NDArray[np.int_]
+    at: Integers
     nodes: Any
 
     @classmethod

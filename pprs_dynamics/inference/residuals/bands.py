@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from scipy import fft
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
@@ -162,7 +162,7 @@ class DriveSeries:
         frequency = np.concatenate([*(
             np.arange(len(part)) / (2 * residuals.period * (part[-1] - part[0] + 1))
             for part in known), np.zeros(0)])
-        self._rotations: list[tuple[np.typing.NDArray[np.int_], Array]] = []
+        self._rotations: list[tuple[Integers, Array]] = []
         at = 0
         for record in records:
             means = first[at:at + len(record)]
@@ -301,7 +301,7 @@ class _Narrowing:
         return expected
 
 
-def _fast(samples: np.typing.NDArray[np.int_]) -> np.typing.NDArray[np.int_]:
+def _fast(samples: Integers) -> Integers:
     """Return the samples of a stretch less a few at its end.
 
     A count without large prime factors is transformed ten times as fast.

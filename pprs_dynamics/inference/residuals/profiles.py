@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
@@ -38,7 +38,7 @@ class Profile:
     edges: Array
     mean: Array
     uncertainty: Array
-    samples: np.typing.NDArray[np.int_]
+    samples: Integers
 
 
 @dataclass(frozen=True)

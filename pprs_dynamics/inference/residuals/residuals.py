@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array, Integers, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 
@@ -72,14 +72,14 @@ class Residuals:
 
     drives: tuple[str, ...]
     time: Array
-    segment: np.typing.NDArray[np.int_]
+    segment: Integers
     measured: Array
     model: Array
     parts: Mapping[str, Array] = field(default_factory=dict)
     variables: Mapping[str, Array] = field(default_factory=dict)
     period: float = 0.01
     units: tuple[DriveUnits, ...] = ()
-    record: np.typing.NDArray[np.int_] = field(
+    record: Integers = field(
         default_factory=lambda: np.zeros(0, dtype=int))
 
     def __post_init__(self) -> None:
@@ -161,7 +161,7 @@ def rms_by_drive(residuals: Residuals) -> dict[str, float]:
             if np.isfinite(residuals.error[:, d]).any()}
 
 
-def _runs(segment: np.typing.NDArray[np.int_]) -> list[slice]:
+def _runs(segment: Integers) -> list[slice]:
     cuts = np.flatnonzero(np.diff(segment)) + 1
     edges = [0, *cuts.tolist(), len(segment)]
     return [slice(a, b) for a, b in pairwise(edges) if b > a]

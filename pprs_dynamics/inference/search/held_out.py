@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Integers, Regression
+from pprs_dynamics.arrays import Array, Integers
+from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Regression
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component

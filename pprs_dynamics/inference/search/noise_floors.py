@@ -21,7 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
-from pprs_dynamics.inference.regression.normal_equations import Block, NormalEquations
+from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
@@ -53,7 +53,7 @@ def noise_floors(fits: FittedSets, period: float | None = None,
     regression, residuals = fits.regression, fits.design.residuals
     fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
     # Degrees of freedom that the columns leave, and the shares of both noises that lie there.
-    free = np.maximum(regression.counts - NormalEquations(regression, fit.blocks).leverage(
+    free = np.maximum(regression.counts - regression.system(fit.blocks).leverage(
         fit.covariance, fit.spectra), 0.0)
     powers = [noise.amplitudes @ regression.noise_shapes.at_bands for noise in (
         fit, reported or fit)]

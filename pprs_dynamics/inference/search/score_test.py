@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import term_gains
 
@@ -55,7 +55,7 @@ class _Group(Generic[Label]):
     """
 
     labels: list[Label]
-    rows: np.typing.NDArray[np.int_]
+    rows: Integers
     grams: dict[int, Array]
     precision: Array
     mean: Array
