@@ -21,9 +21,8 @@ from benchmarks.real.emps_files import IDENTIFICATION, PULSES, read_emps
 from benchmarks.real.recorded_data import need_data
 from benchmarks.results import ROOT, write_results
 from pprs_dynamics import DriveModel, JointMotion, PprsError
-from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.adopt import AdoptionRun, adopt, adopt_all
 from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis

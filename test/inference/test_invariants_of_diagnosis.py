@@ -17,8 +17,8 @@ from single_axis import AXIS, TIME, Effects, axis, axis_motion, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion, compare
 from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.inference.adoption.adopt import adopt_all
 from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
-from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.answer import Answer, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis

@@ -192,7 +192,7 @@ def dense(y: Array, covariance: Array) -> tuple[Array, Array]:
 def test_with_white_noise_that_is_known_it_is_the_textbook() -> None:
     y = (1.4 * COLUMNS['velocity'] - 0.3 * COLUMNS['position'] + 0.1
          + np.random.default_rng(2).normal(0, 0.4, LONG))
-    found = fit(y, COLUMNS, PRIOR, 0.4, STEP)
+    found = fit(y, COLUMNS, {name: prior[:2] for name, prior in PRIOR.items()}, 0.4, STEP)
     mean, spread = dense(y, 0.16 * np.eye(LONG))
     np.testing.assert_allclose(list(found.values.values()), mean, atol=1e-8)
     np.testing.assert_allclose(list(found.deviations.values()), spread, rtol=1e-6)

@@ -18,7 +18,6 @@ from model_recordings import record, with_effects
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.information import FittedTerm, Information, whitened
 from pprs_dynamics.inference.experiments.motion_design import (
     MotionLimits,
     Motions,
@@ -31,6 +30,7 @@ from pprs_dynamics.inference.experiments.next_experiment import (
     PurposeError,
     next_experiment,
 )
+from pprs_dynamics.inference.experiments.question import FittedTerm, Information, whitened
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentParameter,

@@ -29,7 +29,7 @@ from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.adoption.loop import AdoptionRun
+from pprs_dynamics.inference.adoption.adopt import AdoptionRun
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty

@@ -28,11 +28,10 @@ from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.app.report.terminal import escape, shell_command, stacked, verdict_panel
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.adoption.adopt import AMBIGUOUS, REFUSED, AdoptionRun, original
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
-from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.adoption.adopt import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
-from pprs_dynamics.inference.adoption.loop import AMBIGUOUS, REFUSED, AdoptionRun
-from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.quantities import (
     as_fitted,

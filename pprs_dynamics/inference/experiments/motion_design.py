@@ -193,8 +193,6 @@ class Motions:
         In addition to those of the model.
     duration : float
         [s]
-    harmonics : sequence of int
-        Highest harmonics, of which one is drawn.
 
     Raises
     ------
@@ -205,7 +203,6 @@ class Motions:
     model: DriveModel
     limits: MotionLimits
     duration: float
-    harmonics: Sequence[int] = HARMONICS
     middle: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -241,8 +238,8 @@ class Motions:
 
     def draw(self, random: Random) -> JointSeries:
         """Return a random motion: each coordinate has a random share of its largest size."""
-        highest = [k for k in self.harmonics if k <= HIGHEST_FREQUENCY * self.duration]
-        harmonics, count = int(random.choice(highest or self.harmonics[:1])), len(self.middle)
+        highest = [k for k in HARMONICS if k <= HIGHEST_FREQUENCY * self.duration]
+        harmonics, count = int(random.choice(highest or HARMONICS[:1])), len(self.middle)
         series = JointSeries(random.normal(size=(count, JointSeries.size(harmonics))),
                              self.middle, self.duration, harmonics)
         return self._sized(series, np.exp(random.uniform(np.log(SMALLEST), 0.0, count)))

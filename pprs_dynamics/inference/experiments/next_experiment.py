@@ -16,12 +16,12 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.information import FittedTerm
 from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, design
 from pprs_dynamics.inference.experiments.question import (
     COMMISSION,
     ESTIMATE,
     SEPARATE,
+    FittedTerm,
     Question,
     commissioning,
     precision_of,

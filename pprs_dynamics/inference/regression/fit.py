@@ -16,7 +16,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
@@ -73,7 +73,7 @@ class ColumnsFit:
     joint: JointFit = field(repr=False)
 
 
-def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | None = None,
+def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Sequence[float]] | None = None,
         noise: float | None = None, period: float = 1.0) -> ColumnsFit:
     """Return the fit of columns to one or several series, with the noise fitted as well.
 
@@ -84,6 +84,7 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | Non
     columns : mapping of str to array
         Of the shape of y. A coefficient is shared by all series in which its column is not 0.
     prior : mapping of str to Prior, optional
+        Or to mean and standard deviation.
     noise : float, optional
         Standard deviation of white noise; by default a smooth falling spectrum is fitted to each
         series by restricted maximum likelihood.
@@ -105,7 +106,7 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | Non
     residuals = Residuals(drives, time, np.zeros(len(y), dtype=int), series,
                           np.zeros_like(series), period=period)
     regression = Regression(residuals)
-    priors = [(prior or {}).get(name, Prior()) for name in columns]
+    priors = [Prior(*(prior or {}).get(name, ())) for name in columns]
     rows = [column.reshape(series.shape) for column in columns.values()]
     blocks = [regression.block(
         {d: row[:, d] for d in range(series.shape[1]) if np.any(row[:, d])},
