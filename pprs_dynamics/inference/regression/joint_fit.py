@@ -313,11 +313,6 @@ class Regression:
                                  self.residuals.period, float(fit.spectra[k, 0]))
                 for k, d in enumerate(self.drives)}
 
-    def left(self, fit: JointFit) -> Array:
-        """Return the root of the mean square of the residual of each drive, (D,) [N]."""
-        found: Array = np.sqrt(fit.squares.sum(axis=1) / self.counts.sum(axis=1))
-        return found
-
     def misfit(self, fit: JointFit) -> float:
         """Return the deviance without what the coefficients' prior has in it."""
         return float(np.sum(self.counts * np.log(fit.spectra) + fit.squares / fit.spectra))
