@@ -24,12 +24,7 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.estimates import Estimate
-from pprs_dynamics.physics.effects.laws.measured_curve import (
-    OF,
-    Curve,
-    MeasuredCurve,
-    spline_basis,
-)
+from pprs_dynamics.physics.effects.laws.measured_curve import OF, Curve, MeasuredCurve, spline_basis
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 INTERVALS = 96  # between knots; the prior on the roughness decides how fine the curve is

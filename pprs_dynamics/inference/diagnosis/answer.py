@@ -34,12 +34,7 @@ from pprs_dynamics.inference.search.candidates import (
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
-from pprs_dynamics.inference.search.estimates import (
-    Estimates,
-    averaged,
-    calibrations,
-    estimate,
-)
+from pprs_dynamics.inference.search.estimates import Estimates, averaged, calibrations, estimate
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.fitted_model import (
     linear_error,

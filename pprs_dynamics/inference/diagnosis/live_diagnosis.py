@@ -18,11 +18,7 @@ from typing import Any
 
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import (
-    with_drives,
-    with_uncertainty,
-    word_little,
-)
+from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty, word_little
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.held_out import predictive_gain

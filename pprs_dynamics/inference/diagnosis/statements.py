@@ -13,12 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.inference.diagnosis.quantities import (
-    listed,
-    plain,
-    sentence,
-    with_sign,
-)
+from pprs_dynamics.inference.diagnosis.quantities import listed, plain, sentence, with_sign
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import DrivePatterns

@@ -19,10 +19,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import calibrations
-from pprs_dynamics.inference.search.explained_effort import (
-    explained_shares,
-    little_explained,
-)
+from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
 from pprs_dynamics.inference.search.fitted_model import fitted_model, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording

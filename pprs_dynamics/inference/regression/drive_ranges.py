@@ -14,11 +14,7 @@ from scipy import fft
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
-from pprs_dynamics.physics.effects.drive_effect import (
-    Clearance,
-    DriveRange,
-    Windup,
-)
+from pprs_dynamics.physics.effects.drive_effect import Clearance, DriveRange, Windup
 from pprs_dynamics.physics.effects.laws.elastic_joint import load_by_windup
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
