@@ -104,7 +104,7 @@ def ranked_sets(*names: str) -> tuple[RankedSet, ...]:
 
 def calibration(after: float = 1.02) -> Calibration:
     """Return a payload that was weighed with a tolerance of 5 %."""
-    return Calibration('masses.payload', None, 1.0, after, 0.002, 'kg')
+    return Calibration('masses.payload', None, 1.0, 0.02, 'kg', after, 0.002)
 
 
 def ranked_effect(name: str, drives: tuple[str, ...] | None, evidence: float,

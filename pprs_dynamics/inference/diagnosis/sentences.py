@@ -493,12 +493,12 @@ def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
 
 
 def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
-    moved = (f'{number.label}: {with_uncertainty(number.before, 0.0, number.unit)} becomes '
+    moved = (f'{number.label}: {with_uncertainty(number.value, 0.0, number.unit)} becomes '
              f'{with_uncertainty(number.after, number.std, number.unit)}')
     tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
     if not tolerance:
         return moved
-    is_within = (abs(number.after - number.before)
-                 <= tolerance * abs(number.before) + INTERVAL * number.std)
+    is_within = (abs(number.after - number.value)
+                 <= tolerance * abs(number.value) + INTERVAL * number.std)
     return (f'{moved} (tolerance {tolerance:.0%})' if is_within else
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first')

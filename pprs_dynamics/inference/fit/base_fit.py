@@ -148,5 +148,5 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     fits = FittedSets(Design.of(model, recordings), DECISIONS)
     fits, found = linearised(fits, fits.evaluate(()))
     return fitted_model(fits, found), tuple(
-        FittedNumber(number.label, '', number.before, number.after, number.std, number.unit)
+        FittedNumber(number.label, '', number.value, number.after, number.std, number.unit)
         for number in calibrations(fits, found)), ()

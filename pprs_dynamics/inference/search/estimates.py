@@ -22,6 +22,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.regression.sensitivities import Number
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -48,24 +49,21 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """A number of the model that was moved within its tolerance."""
+class Calibration(Number):
+    """A number of the model that was moved within its tolerance.
 
-    key: str
-    element: int | None
-    before: float
+    Parameters
+    ----------
+    after, std : float
+        Its fitted value and standard deviation.
+    """
+
     after: float
     std: float
-    unit: str
-
-    @property
-    def label(self) -> str:
-        """Name for people, e.g. masses.slides[2]."""
-        return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
-        return {'key': self.label, 'before': self.before, 'after': self.after, 'std': self.std,
+        return {'key': self.label, 'before': self.value, 'after': self.after, 'std': self.std,
                 'unit': self.unit}
 
 
@@ -420,12 +418,8 @@ def estimate_present(fits: FittedSets, fitted: CandidateSet, effect: CatalogueEf
 
 def calibrations(fits: FittedSets, fitted: CandidateSet) -> list[Calibration]:
     """Return the numbers of the model as the fit moves them within their tolerances."""
-    calibrated = []
-    for k, column in enumerate(fits.design.base):
-        if isinstance(column, ModelNumber):
-            number = column.number
-            std = float(np.sqrt(fitted.fit.covariance[k, k])) * number.deviation
-            calibrated.append(Calibration(
-                number.key, number.element, number.value,
-                column.value(float(fitted.fit.coefficients[k])), std, number.unit))
-    return calibrated
+    fit = fitted.fit
+    return [Calibration(
+        **vars(column.number), after=column.value(float(fit.coefficients[k])),
+        std=float(np.sqrt(fit.covariance[k, k])) * column.number.deviation)
+        for k, column in enumerate(fits.design.base) if isinstance(column, ModelNumber)]
