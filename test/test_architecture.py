@@ -75,14 +75,6 @@ def test_a_recording_is_read_without_the_model(tmp_path: Path) -> None:
                           check=True).stdout.strip() == '[]'
 
 
-def test_importing_the_package_imports_neither_ros_nor_plotting() -> None:
-    code = ('import sys, pprs_dynamics; pprs_dynamics.DriveModel.load(); '
-            'print(" ".join({name.split(".")[0] for name in sys.modules}))')
-    loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                            check=True).stdout.split()
-    assert not set(loaded) & (ROS | PLOTTING)
-
-
 def test_every_equation_of_the_paper_is_cited_and_no_other() -> None:
     cited: set[int] = set()
     for file in files():

@@ -109,11 +109,11 @@ def tables() -> dict[str, dict[str, np.ndarray]]:
             **columns('tau_{k}', TAU)}}
 
 
-@pytest.mark.parametrize('name', tables())
-def test_a_table_is_read_as_it_was(name: str, robot: Path, tmp_path: Path) -> None:
-    pd.DataFrame(tables()[name]).to_csv(tmp_path / 'run.csv', index=False, sep=';')
-    recording = read(robot, tmp_path / 'run.csv')
-    assert_read(recording, recording.velocity is not None)
+def of_a_program(name: str) -> Callable[[Path], list[Path]]:
+    def write(folder: Path) -> list[Path]:
+        pd.DataFrame(tables()[name]).to_csv(folder / 'run.csv', index=False, sep=';')
+        return [folder / 'run.csv']
+    return write
 
 
 def with_what_was_asked_for(folder: Path) -> list[Path]:
@@ -189,8 +189,8 @@ def currents(folder: Path) -> list[Path]:
 
 
 @pytest.mark.parametrize('write', [
-    with_what_was_asked_for, structure, of_a_european_spreadsheet, joined_logs, one_file_each,
-    lerobot, bag, currents])
+    *map(of_a_program, tables()), with_what_was_asked_for, structure, of_a_european_spreadsheet,
+    joined_logs, one_file_each, lerobot, bag, currents])
 def test_what_init_writes_reads_the_recording_as_it_was(
     write: Callable[[Path], list[Path]], robot: Path, tmp_path: Path,
 ) -> None:

@@ -5,19 +5,20 @@
 
 from __future__ import annotations
 
-import argparse
 import ast
 import json
 import re
 from collections.abc import Iterator
+from contextlib import redirect_stdout, suppress
 from functools import cache
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from documents import FENCE, PROJECT, anchors, code, links, pages, text_of
 
-from pprs_dynamics.app.commands.pprs import COMMANDS, _parser
+from pprs_dynamics.app.commands.pprs import COMMANDS, main
 from pprs_dynamics.inference.search.decisions import OUTSIDE_COST
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
@@ -35,9 +36,9 @@ MODULE = re.compile(r'(?<![\w/.])pprs_dynamics(?:\.\w+)+')
 @cache
 def options(command: str) -> frozenset[str]:
     """Return the options of a command of `pprs`."""
-    subparsers = next(action for action in _parser([command])._actions
-                      if isinstance(action, argparse._SubParsersAction))
-    return frozenset(subparsers.choices[command]._option_string_actions)
+    with redirect_stdout(StringIO()) as shown, suppress(SystemExit):
+        main([command, '--help'])
+    return frozenset(re.findall(r'--[a-z][a-z-]+', shown.getvalue()))
 
 
 @cache

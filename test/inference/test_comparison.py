@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from benchmarks.scores import localisation as benchmark
 from pprs_dynamics.inference.diagnosis.comparison import Localisation, compare, localise
@@ -19,13 +18,6 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsErro
 
 PERIOD = 0.01
 NOWHERE = Localisation((), {})
-
-
-def ar1(phi: float, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """Return AR(1) noise of unit variance, long after its start."""
-    warm = int(12 / (1 - phi))
-    y = lfilter([1.0], [1.0, -phi], rng.normal(size=samples + warm))[warm:]
-    return np.asarray(y * np.sqrt(1 - phi ** 2))
 
 
 def recording(error: np.ndarray, effort: np.ndarray) -> Residuals:
@@ -87,7 +79,7 @@ def test_noise_is_called_noise_and_an_error_beyond_it_is_not() -> None:
     rng = np.random.default_rng(6)
     time = PERIOD * np.arange(3000)
     effort = 3 * np.sin(0.7 * time)[:, None]
-    noise = 0.05 * ar1(0.9, 3000, rng)[:, None]
+    noise = 0.05 * benchmark.make_noise(0.9, 3000, rng, 1)
     floors = {'drive_0': 0.05}
     quiet = compare(recording(noise, effort), floors=floors).drives['drive_0']
     assert quiet.grade == 'noise'

@@ -122,17 +122,15 @@ def test_no_hidden_effect_is_called_a_mistake(name: str) -> None:
     assert found == ()
 
 
-@pytest.mark.parametrize('gain', [0.5])
-def test_a_gain_that_the_catalogue_knows_is_no_unit(gain: float) -> None:
+def test_a_gain_that_the_catalogue_knows_is_no_unit() -> None:
     time, position, velocity, effort = robot()
-    assert told((time, position, velocity, effort * gain)) == []
-    assert told((time, position, velocity, effort * [1, 1, gain, 1, gain, 1])) == []
+    assert told((time, position, velocity, effort * 0.5)) == []
+    assert told((time, position, velocity, effort * [1, 1, 0.5, 1, 0.5, 1])) == []
 
 
-@pytest.mark.parametrize('offset', [-0.03])
-def test_a_zero_that_is_off_is_no_mistake_of_units(offset: float) -> None:
+def test_a_zero_that_is_off_is_no_mistake_of_units() -> None:
     time, position, velocity, effort = robot()
-    assert told((time, position + np.eye(6)[0] * offset, velocity, effort)) == []
+    assert told((time, position - np.eye(6)[0] * 0.03, velocity, effort)) == []
 
 
 def test_a_recording_of_another_robot_is_told_nothing_false() -> None:
@@ -166,14 +164,13 @@ def test_positions_far_out_of_their_stroke_tell_it_without_efforts() -> None:
     assert 'far out of the stroke, as if they were in millimetres' in finding.text
 
 
-@pytest.mark.parametrize(('factor', 'word'), [(1e3, '1000 times')])
-def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: str) -> None:
+def test_velocities_that_are_not_the_derivative_are_told() -> None:
     time, position, velocity, effort = robot()
-    expect(told((time, position, factor * velocity, effort)),
-           [f'velocity of all drives is {word} the derivative of the position'])
-    velocity[:, 3:] *= factor
+    expect(told((time, position, 1e3 * velocity, effort)),
+           ['velocity of all drives is 1000 times the derivative of the position'])
+    velocity[:, 3:] *= 1e3
     expect(told((time, position, velocity, effort)),
-           [f'velocity of lift_1, lift_2, lift_3 is {word}'])
+           ['velocity of lift_1, lift_2, lift_3 is 1000 times'])
 
 
 def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:

@@ -149,11 +149,10 @@ def test_a_gain_that_a_drive_may_have_is_one() -> None:
     assert found.effects[0].parameters['axis.gain'].value == pytest.approx(0.2, abs=0.02)
 
 
-@pytest.mark.parametrize('seed', [0])
-def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path, seed: int) -> None:
+def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path) -> None:
     """Radians that are called degrees: next to no motion, which linear forces are far from."""
     real = arm.real_arm(tmp_path)
-    run = arm.record(real, arm.motion(12.0, seed=seed), 0.2, seed)
+    run = arm.record(real, arm.motion(12.0, seed=0), 0.2, 0)
     radians = np.array([np.pi / 180, np.pi / 180, 1.0])
     found = diagnose(DriveModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
         'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)

@@ -13,10 +13,9 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 from made_up_arm import motion, real_arm, record
-from scipy.signal import lfilter
 
+from benchmarks.scores.localisation import make_noise
 from pprs_dynamics import compare
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -32,16 +31,11 @@ def design() -> Design:
     return Design.of(arm, [record(arm, motion(), NOISE)])
 
 
-def ar1(phi: float, shape: tuple[int, int], seed: int) -> Array:
-    white = np.random.default_rng(seed).normal(size=(shape[0] + 3000, shape[1]))
-    found: Array = lfilter([(1 - phi ** 2) ** 0.5], [1, -phi], white, axis=0)[3000:]
-    return found
-
-
 @pytest.mark.parametrize(('phi', 'off'), [(0.0, 0.06), (0.9, 0.12), (0.99, 0.35)])
 def test_the_noise_is_that_which_was_put_in_beside_all_columns(phi: float, off: float) -> None:
     made = design()
-    noise = NOISE * ar1(phi, made.residuals.measured.shape, 3)
+    samples, width = made.residuals.measured.shape
+    noise = NOISE * make_noise(phi, samples, np.random.default_rng(3), width)
     fits = FittedSets(replace(made, residuals=replace(
         made.residuals, measured=made.residuals.model + noise)), DECISIONS)
     found = noise_floors(fits)

@@ -59,30 +59,20 @@ def test_a_block_on_a_spring_sticks_and_slips() -> None:
     assert 0.05 < found.speed < 0.09
 
 
-def test_a_stiff_drive_without_falling_friction_does_not() -> None:
-    position, effort = dragged(slow(), static=0.6)
-    assert find_stick_slip(TIME, position, effort) is None
+def strokes(position: Array, stiffness: float, width: float) -> tuple[Array, Array]:
+    """Return a position, and the effort of a spring and of dry friction along it."""
+    return position, stiffness * position + 0.5 * np.tanh(np.gradient(position, STEP) / width)
 
 
-def test_a_motion_that_was_meant_to_pause_does_not() -> None:
+@pytest.mark.parametrize('moved', [
+    dragged(slow(), static=0.6),
     # Steps of a quarter of a second, and rests as long: a drive at rest is not loaded further.
-    asked = 0.03 * (np.floor(TIME * 2) + np.clip((TIME * 2) % 1 * 2, 0, 1))
-    velocity = np.gradient(asked, STEP)
-    effort = 2.0 * velocity + 0.5 * np.tanh(velocity / 0.005)
-    assert find_stick_slip(TIME, asked, effort) is None
-
-
-def test_the_stairs_of_a_coarse_encoder_do_not() -> None:
-    position = 0.01 * np.round(slow() / 0.01)
-    rng = np.random.default_rng(3)
-    assert find_stick_slip(TIME, position, rng.normal(size=len(TIME))) is None
-
-
-def test_strokes_to_and_fro_do_not() -> None:
-    position = 0.5 * np.sin(2 * np.pi * 0.5 * TIME)
-    velocity = np.gradient(position, STEP)
-    effort = 3 * position + 0.5 * np.tanh(velocity / 0.01)
-    assert find_stick_slip(TIME, position, effort) is None
+    strokes(0.03 * (np.floor(TIME * 2) + np.clip((TIME * 2) % 1 * 2, 0, 1)), 0.0, 0.005),
+    (0.01 * np.round(slow() / 0.01), np.random.default_rng(3).normal(size=len(TIME))),
+    strokes(0.5 * np.sin(np.pi * TIME), 3.0, 0.01),
+], ids=['no falling friction', 'pauses', 'coarse encoder', 'to and fro'])
+def test_what_only_looks_like_it_does_not(moved: tuple[Array, Array]) -> None:
+    assert find_stick_slip(TIME, *moved) is None
 
 
 @pytest.mark.parametrize('depth', [0.7, 1.0, 1.3])

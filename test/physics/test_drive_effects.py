@@ -265,9 +265,8 @@ def test_effect_acts_in_its_drive_alone_and_by_that_drives_motion(effect):
     assert np.sqrt(np.mean(force[:, 1] ** 2)) > 1e-3
 
 
-@pytest.mark.parametrize('chunk', [7])
 @every_effect
-def test_a_stream_with_a_carried_memory_equals_one_call(effect, chunk):
+def test_a_stream_with_a_carried_memory_equals_one_call(effect):
     drives = ('slide_2', 'lift_1')
     axes = excitation(4.0, drives)
     rng = np.random.default_rng(68)
@@ -275,8 +274,7 @@ def test_a_stream_with_a_carried_memory_equals_one_call(effect, chunk):
     built = effect({drive: random_values(effect, rng) for drive in drives})
     memory = built.initial_memory()
     assert (memory is not None) == (effect in WITH_MEMORY)
-    parts = [built.force(axes[start:start + chunk], memory)
-             for start in range(0, len(axes.time), chunk)]
+    parts = [built.force(axes[start:start + 7], memory) for start in range(0, len(axes.time), 7)]
     assert_array_equal(np.concatenate(parts), built.force(axes))
 
 
@@ -377,14 +375,13 @@ def test_every_effect_with_a_memory_is_tried() -> None:
 
 
 @pytest.mark.parametrize('name', [name for name in CATALOGUE if name not in ELSEWHERE])
-@pytest.mark.parametrize('start', [5.0])
-def test_an_effect_begins_anew_and_gives_what_it_gave_at_first(name: str, start: float) -> None:
+def test_an_effect_begins_anew_and_gives_what_it_gave_at_first(name: str) -> None:
     model = with_any(name)
     state, fresh = model.initial_state(), model.initial_state()
     efforts(model, state, 1000.0, MOTION)
-    again = efforts(model, state, start, MOTION)
+    again = efforts(model, state, 5.0, MOTION)
     assert np.isfinite(again).all()
-    np.testing.assert_array_equal(again, efforts(model, fresh, start, MOTION))
+    np.testing.assert_array_equal(again, efforts(model, fresh, 5.0, MOTION))
 
 
 def test_a_stream_that_goes_on_remembers() -> None:

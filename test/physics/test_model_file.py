@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -103,10 +102,9 @@ def test_a_wrong_value_is_told_with_file_key_value_and_rule(
         assert str(value)[:100] in message
 
 
-@pytest.mark.parametrize('key', ['masses.payload'])
-def test_a_missing_key_is_told(tmp_path: Path, key: str) -> None:
-    with pytest.raises(ModelError, match=f'{re.escape(key)} is missing, must'):
-        DriveModel.load(written(tmp_path, {}, (key,)))
+def test_a_missing_key_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r'masses\.payload is missing, must'):
+        DriveModel.load(written(tmp_path, {}, ('masses.payload',)))
 
 
 FOREIGN = {

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from model_recordings import with_effects
 
-from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
@@ -163,17 +163,14 @@ PLATFORM = DriveModel.load('config/paper.yaml')
 ], ids=['paper', 'masses', 'elbow down'])
 def test_a_simulated_platform_needs_the_forces_of_the_paper(change: dict[str, Any]) -> None:
     model = DriveModel.from_parameters({**PLATFORM.values, **change})
-    motion = Excitation(seed=3).motion(6.0 + np.arange(200) / 100)
-    forces, state = model.drive_forces(motion), model.mechanism(motion)
-    plain = PlainRobot(as_mechanism(model), JointMotion(
-        state.position, state.velocity, state.acceleration, motion.time))
-    assert np.abs(plain.effort - forces.total).max() < 1e-8
+    plain, motion = plain_platform(model, 6.0)
+    assert np.abs(plain.effort - model.drive_forces(motion).total).max() < 1e-8
 
 
 @pytest.mark.parametrize('name', [name for name in NAMES if name not in (
     'counterbalance', 'eccentric_encoder', 'coupled_drives', 'elastic_joint')])
 def test_an_injected_effect_changes_its_drives_alone_and_repeats(name: str) -> None:
-    plain, effect = plain_platform(), Choice(name, np.random.default_rng(1))
+    plain, effect = paper_run(), Choice(name, np.random.default_rng(1))
     first, again = (Injection(plain, [effect], np.random.default_rng(2)) for _ in range(2))
     np.testing.assert_array_equal(first.efforts, again.efforts)
     added = np.abs(first.efforts - plain.effort).max(axis=0)
@@ -185,12 +182,18 @@ def test_an_injected_effect_changes_its_drives_alone_and_repeats(name: str) -> N
     assert np.all(shifted[~acts] == 0)
 
 
+def plain_platform(model: DriveModel = PLATFORM, start: float = 0.0, rounds: int = 1,
+                   ) -> tuple[PlainRobot, PlatformMotion]:
+    """Return a platform along 3 s of a path without hidden effects, and that motion."""
+    motion = Excitation(seed=3).motion(start + np.arange(300) / 100)
+    state = model.mechanism(motion)
+    return PlainRobot(as_mechanism(model), JointMotion(
+        state.position, state.velocity, state.acceleration, motion.time), rounds=rounds), motion
+
+
 @cache
-def plain_platform() -> PlainRobot:
-    time = np.arange(300) / 100
-    state = PLATFORM.mechanism(Excitation(seed=3).motion(time))
-    return PlainRobot(as_mechanism(PLATFORM), JointMotion(
-        state.position, state.velocity, state.acceleration, time))
+def paper_run() -> PlainRobot:
+    return plain_platform()[0]
 
 
 @pytest.mark.parametrize(('name', 'file'), [
@@ -201,12 +204,9 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
     model = DriveModel.load(f'config/{file}.yaml')
     if model.moves_joints:
         motion: Any = draw_motion(model, 6.0, 3)
-        moved = motion
+        plain = PlainRobot(as_mechanism(model), motion, rounds=4)
     else:
-        motion = Excitation(seed=3).motion(6.0 + np.arange(300) / 100)
-        state = model.mechanism(motion)
-        moved = JointMotion(state.position, state.velocity, state.acceleration, motion.time)
-    plain = PlainRobot(as_mechanism(model), moved, rounds=4)
+        plain, motion = plain_platform(model, 6.0, rounds=4)
     run = Injection(plain, [named(name, np.random.default_rng(1), 1.0)], np.random.default_rng(2))
     added = run.efforts - plain.effort
     kind, _, drive = name.partition(':')
@@ -229,11 +229,8 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
 def test_an_injected_load_of_a_3_pprs_is_that_of_the_effect_of_its_name(name: str) -> None:
     values = {**PLATFORM.values, 'friction.drives.coulomb': (0.0,) * 6,
               'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
-    model, motion = DriveModel.from_parameters(values), Excitation(seed=3).motion(
-        np.arange(300) / 100)
-    state = model.mechanism(motion)
-    plain = PlainRobot(as_mechanism(model), JointMotion(
-        state.position, state.velocity, state.acceleration, motion.time))
+    model = DriveModel.from_parameters(values)
+    plain, motion = plain_platform(model)
     run = Injection(plain, [named(name, np.random.default_rng(1), 1.0)], np.random.default_rng(2))
     other = with_effects(model, {name: run.truths[0]['parameters']})
     exact = other.drive_forces(motion).total - model.drive_forces(motion).total
@@ -241,12 +238,12 @@ def test_an_injected_load_of_a_3_pprs_is_that_of_the_effect_of_its_name(name: st
 
 
 def test_given_drives_have_the_effect() -> None:
-    run = Injection(plain_platform(), [named('effort_offset:lift_1,slide_2',
-                                             np.random.default_rng(0), 1.0)],
+    plain = paper_run()
+    run = Injection(plain, [named('effort_offset:lift_1,slide_2', np.random.default_rng(0), 1.0)],
                     np.random.default_rng(2))
     assert run.truths[0]['drives'] == ['lift_1', 'slide_2']
     for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'does not act in'),
                         ('effort_offset:x', 'does not act in')):
         with pytest.raises(InjectedEffectError, match=text):
-            Injection(plain_platform(), [named(words, np.random.default_rng(0), 1.0)],
+            Injection(plain, [named(words, np.random.default_rng(0), 1.0)],
                       np.random.default_rng(2))
