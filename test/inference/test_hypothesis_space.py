@@ -36,7 +36,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.search import Search, simplified
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -161,6 +161,19 @@ def test_the_search_ends_at_the_best_of_all_sets(
     assert sets_of(found) == sets_of(best)
     assert {name for name, _ in sets_of(found)} == {name for name, _ in truth}
     assert found.cost == pytest.approx(exhaustive.evaluate(found.candidates).cost, abs=1e-6)
+
+
+def test_a_search_from_the_best_set_alone_would_end_at_a_dearer_one() -> None:
+    truth = {('structure_0', None): -1.5, ('structure_1', None): -1.4, ('drive_0', 2): 0.6,
+             ('drive_1', 0): 1.4, ('drive_1', 2): 1.3}
+    found = Search(FittedSets(random_design(truth, 924), DECISIONS)).run()
+    assert {name for name, _ in sets_of(found)} == {name for name, _ in truth}
+
+
+def test_what_is_superfluous_is_dropped() -> None:
+    fits = FittedSets(random_design({('structure_3', None): 1.5}, 5), DECISIONS)
+    other, right = (everything()[number] for number in (0, 3))
+    assert simplified(fits, fits.evaluate((other, right))).candidates == (right,)
 
 
 def test_costs_do_not_depend_on_what_was_fitted_before() -> None:

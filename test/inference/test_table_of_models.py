@@ -17,11 +17,16 @@ from pprs_dynamics.inference.diagnosis.answer import Answer, objection, rival_ef
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.candidates import Candidate, Component, EffectCandidate
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    Component,
+    CostTerms,
+    EffectCandidate,
+)
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import estimate
 from pprs_dynamics.inference.search.held_out import BLOCKS, HeldOut, PredictiveGain
-from pprs_dynamics.inference.search.table import ModelTable, Row
+from pprs_dynamics.inference.search.table import ModelTable, Row, with_exact_best
 from pprs_dynamics.inference.search.unknown import best_patterns
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
@@ -61,6 +66,23 @@ def test_one_effect_in_the_place_of_two_is_a_rival_of_both() -> None:
     table = with_rows(table_of(*TWO), {(SPRING,): 1.0})
     assert set(Answer(table, table.best, ()).diagnosis().indistinguishable) >= {
         (name, 'drive_spring') for name in TWO}
+
+
+def test_the_row_of_least_cost_has_the_cost_of_exact_forces() -> None:
+    """Exact forces are dear for all rows that were the best: another row takes their place."""
+    table = table_of('viscous_friction')
+    dear = replace(table, exact={key: replace(row, linearisation=1e6)
+                                 for key, row in table.exact.items()})
+    assert not dear.best.is_exact
+    assert with_exact_best(dear).best.is_exact
+
+
+def test_an_effect_that_claims_two_things_pays_for_two() -> None:
+    costs, name = table_of('viscous_friction').last.prior_costs, 'asymmetric_friction'
+    forms = (effect(name, variant) for variant in range(len(CATALOGUE[name].variants)))
+    pays = {len(form.hypotheses): costs.of_candidate(form, lambda component: CostTerms()).names
+            for form in forms}
+    assert 1 < pays[1] == pytest.approx(pays[2] / 2)
 
 
 def test_a_rival_is_taken_from_a_row_without_the_effect_that_it_replaces() -> None:

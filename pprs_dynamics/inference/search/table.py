@@ -318,11 +318,11 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
                         lambda share: report(0.6 + 0.3 * share))
         search.run(best.fitted.candidates)
         exact = _with_exact_costs(search, first, exact)
-    table = _with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
+    table = with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
     fit_courses(table.last, table.reported, list(table.alone.values()),
                 None if first is search.fits else first)
     report(1.0)
-    return _with_exact_best(table)
+    return with_exact_best(table)
 
 
 def input_model_alone(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
@@ -346,7 +346,7 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
     return exact
 
 
-def _with_exact_best(table: ModelTable) -> ModelTable:
+def with_exact_best(table: ModelTable) -> ModelTable:
     """Return a table in which the rows that may be the best have exact costs.
 
     Those within the margin of rivals, and the best row without one of its effects: around the
