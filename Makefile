@@ -43,8 +43,9 @@ demo: $(VENV)/.demo
 demo-feedforward: $(VENV)/.demo
 	@$(BIN)/python demo/feedforward_demo.py output
 
-# A test that hangs ends after this many seconds, with the stacks of all threads.
-LIMIT := --timeout 300
+# A test that hangs ends after this many seconds, with the stacks of all threads. The slowest are
+# listed, and build/ gets the time of every test.
+LIMIT := --timeout 300 --durations 40
 
 # Nodes run in real time and mostly wait: they have the processor when they want it, and all else
 # calculates meanwhile, in files by name, the dear ones of `app` and `inference` first.
@@ -53,11 +54,13 @@ test: $(VENV)/.test lint
 	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
 
 test-nodes: $(VENV)/.test
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(LIMIT) $(PYTEST)
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(LIMIT) \
+	    --junitxml build/test-nodes.xml $(PYTEST)
 
 test-others: $(VENV)/.test
 	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
-	    -m 'not nodes and not slow' --file-budget 20 $(LIMIT) $(PYTEST)
+	    -m 'not nodes and not slow' --file-budget 20 $(LIMIT) \
+	    --junitxml build/test-others.xml $(PYTEST)
 
 # What runs before a release: the site, colcon, demonstrations, clusters, long diagnoses, pictures.
 test-slow: $(VENV)/.test $(VENV)/.docs
