@@ -52,6 +52,7 @@ LEAST_TERM = 0.05  # of a cost, that one digit shows
 WHOLE = 20  # difference of costs from which it is rounded to a whole number
 VAGUE = 0.1  # relative uncertainty of a mass, beyond which its first moment is given if surer
 MOSTLY = 0.95  # of a recording, from which on a reference covers its states
+HARDLY = 0.5  # of a recording, below which it covers too few of them to date an effect
 # Ratio of speeds beyond which lags depend on the speed: at half the speed a real arm shows delays
 # of up to 70 ms that it has not; a program repeats its own speeds to hundredths.
 ALIKE_PACE = 1.25
@@ -152,7 +153,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     """
     following, command = next_step(diagnosis, files)
     headline = _headline(diagnosis)
-    if diagnosis.since:
+    if diagnosis.since and diagnosis.since.covered >= HARDLY:
         headline = (f'Since {listed(diagnosis.since.recordings)}: '
                     f'{headline[:1].lower()}{headline[1:]}')
     return Sentences(
@@ -294,7 +295,9 @@ def word_reference(since: SinceReference | None) -> tuple[str, ...]:
     words = [f'{listed(since.recordings)} covers {since.covered:.0%} of the states of this '
              'recording' + ('' if since.covered > MOSTLY else '; elsewhere only the model is known')
              + f'. Of the squared error it explains {shares}',
-             'a fault that was already in the reference cannot be seen']
+             'a fault that was already in the reference cannot be seen'
+             if since.covered >= HARDLY else
+             'what is reported may be older than the reference: repeat its motion to see a change']
     if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
         words.append(f'this recording moves at {since.pace:.2g} times the speed of the reference: '
                      'confirm a delay or a hysteresis with a reference of this speed')
