@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import yaml
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.files import require_file
+from pprs_dynamics.system.files import readable, require_file
 
 LARGEST = 5_000_000  # bytes: a ledger of a thousand steps
 # The parser in C is ten times faster, and not everywhere.
@@ -33,11 +33,8 @@ def read_text(path: str | PathLike[str]) -> str:
         If it cannot be read, is too large, or is not text.
     """
     require_file(path)
-    try:
-        with Path(path).open('rb') as file:
-            content = file.read(LARGEST + 1)
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    with readable(path), Path(path).open('rb') as file:
+        content = file.read(LARGEST + 1)
     check_size(content, path)
     try:
         return content.decode('utf-8')

@@ -28,10 +28,8 @@ KINDS = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a soc
 
 def require_file(path: str | PathLike[str]) -> None:
     """Raise UnreadableFileError where a path is nothing that can be read to its end."""
-    try:
+    with readable(path):
         mode = os.stat(path).st_mode
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
     if not stat.S_ISREG(mode):
         raise UnreadableFileError(path, f'it is {kind_of(mode)}, must be a file')
 
@@ -61,7 +59,7 @@ def new_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """
     target = writable_file(path)
     partial = target.parent / f'{PREFIX}{token_hex(8)}'
-    with _named(path):
+    with readable(path, 'cannot be written: '):
         try:
             with partial.open('x+b') as file:
                 yield file
@@ -98,7 +96,7 @@ def scratch_folder(path: Path) -> Iterator[Path]:
     UnreadableFileError
         Where anything that is done in the block cannot be written.
     """
-    with _named(path), TemporaryDirectory(
+    with readable(path, 'cannot be written: '), TemporaryDirectory(
             prefix=PREFIX, dir=path.parent, ignore_cleanup_errors=True) as folder:
         yield Path(folder)
 
@@ -119,7 +117,7 @@ def writable_file(path: str | PathLike[str]) -> Path:
         the file system does not take.
     """
     target = Path(os.path.realpath(path))
-    with _named(path):
+    with readable(path, 'cannot be written: '):
         try:
             mode = os.stat(path).st_mode
         except FileNotFoundError:
@@ -138,12 +136,16 @@ def kind_of(mode: int) -> str:
 
 
 @contextmanager
-def _named(path: str | PathLike[str]) -> Iterator[None]:
-    """Name the file and the reason where the system refuses."""
+def readable(path: str | PathLike[str], before: str = '') -> Iterator[None]:
+    """Name the file and the reason, after some words, where the system refuses.
+
+    Raises
+    ------
+    UnreadableFileError
+    """
     try:
         yield
     except UnreadableFileError:
         raise
     except OSError as error:
-        raise UnreadableFileError(
-            path, f'cannot be written: {error.strerror or error}') from None
+        raise UnreadableFileError(path, f'{before}{error.strerror or error}') from None

@@ -32,7 +32,6 @@ from pprs_dynamics.measurement.files.merged_states import (
 )
 from pprs_dynamics.measurement.files.name_hints import MOST, missing_names
 from pprs_dynamics.measurement.files.samples import (
-    QUANTITIES,
     Defect,
     Indices,
     Progress,
@@ -133,9 +132,8 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
 def _by_columns(samples: Samples, recorded: RecordedDrives) -> Samples:
     """Return samples in which `columns` of the form <joint>/<quantity> name another joint's."""
     columns = {} if recorded.columns is None else recorded.columns.drives
-    arrays = {name: values for name in QUANTITIES
-              if (values := getattr(samples, name)) is not None}
-    changed = {name: values.copy() for name, values in arrays.items()}
+    arrays = samples.measured
+    changed: Any = {name: values.copy() for name, values in arrays.items()}
     for d, drive in enumerate(recorded.names):
         for quantity, column in columns.get(drive, DriveColumns()).names.items():
             joint, _, named = str(column).rpartition('/')

@@ -19,10 +19,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.csv_files import ZSTANDARD, zstd
 from pprs_dynamics.measurement.files.joint_state_cdr import message_types
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.system.files import require_file
+from pprs_dynamics.system.files import readable, require_file
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -42,8 +43,26 @@ def storage_suffix(path: Path) -> str | None:
 
 
 def is_storage(path: Path) -> bool:
-    """Return whether a file is a bag, or promises to be one; a folder always does."""
-    return (path.is_dir() or _promises(path) or storage_suffix(path) is not None)
+    """Return whether a file is a bag, or promises to be one; a folder does, unless of LeRobot."""
+    if path.is_dir():
+        return not is_lerobot(path)
+    return _promises(path) or storage_suffix(path) is not None
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a recording is a bag, or else a table.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read, or is empty.
+    """
+    with readable(path):
+        # A name that promises a bag is read as one, for the reason why it is none.
+        found = is_storage(path)
+        if not path.is_dir() and not path.stat().st_size:
+            raise UnreadableFileError(path, 'the file is empty')
+    return found
 
 
 def is_bag_folder(path: Path) -> bool:

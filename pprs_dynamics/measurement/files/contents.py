@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.array_files import WIDEST, is_lerobot
+from pprs_dynamics.measurement.files.array_files import WIDEST
 from pprs_dynamics.measurement.files.bag_files import CONTROLLER_TYPES
-from pprs_dynamics.measurement.files.bag_storage import Bag, is_storage, opened_bag
+from pprs_dynamics.measurement.files.bag_storage import Bag, is_bag, opened_bag
 from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
 from pprs_dynamics.measurement.files.merged_states import states_of
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import open_table
+from pprs_dynamics.system.files import readable
 
 ROWS = 4000  # that are looked at
 MESSAGES = 400  # of each topic
@@ -55,16 +55,9 @@ def look_into(path: Path) -> Contents:
     MissingLibraryError
         Where the library for it is not installed.
     """
-    try:
-        if not is_lerobot(path) and is_storage(path):
-            with opened_bag(path) as (bag, _):
-                return Contents(_joints(bag), tuple(_arrays(bag)))
-        if not path.is_dir() and not path.stat().st_size:
-            raise UnreadableFileError(path, 'the file is empty')
-    except OSError as error:
-        if isinstance(error, UnreadableFileError):
-            raise
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    if is_bag(path):
+        with readable(path), opened_bag(path) as (bag, _):
+            return Contents(_joints(bag), tuple(_arrays(bag)))
     table = open_table(path)
     if isinstance(table, CsvTable) and table.numbers < len(table.sample):
         with_commas = CsvTable.open(path, ',')

@@ -32,8 +32,9 @@ from dateutil.parser import parse as parse_date
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples, Series
+from pprs_dynamics.measurement.files.samples import Progress, Samples, Series
 from pprs_dynamics.system.csv_tables import write_table
+from pprs_dynamics.system.files import readable
 from pprs_dynamics.system.numbers import parse_number
 from pprs_dynamics.system.plain_text import counted
 
@@ -320,17 +321,13 @@ def text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
     """Open a file as text, and its bytes, of which `tell` is how far it was read."""
     damages = (EOFError, zlib.error, *([zstd().ZstdError] if path.suffix in ZSTANDARD else []))
     try:
-        with (path.open('rb') as raw, _unpacked(path, raw) as content,
+        with (readable(path), path.open('rb') as raw, _unpacked(path, raw) as content,
               TextIOWrapper(content, encoding=_encoding(path, content)) as file):
             yield file, raw
-    except UnreadableFileError:
-        raise
     except damages:
         raise UnreadableFileError(path, 'damaged: it cannot be unpacked to its end') from None
     except UnicodeDecodeError:
         raise UnreadableFileError(path, NO_TEXT) from None
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
 
 
 def _encoding(path: Path, content: IO[bytes]) -> str:
@@ -385,9 +382,6 @@ def write_csv(path: Path, samples: Samples) -> None:
 
     Times stay counted from `epoch`, which is not written: as floats they would lose digits.
     """
-    quantities = [(name, values) for name, values in zip(
-        QUANTITIES, (samples.position, samples.velocity, samples.effort), strict=True)
-        if values is not None]
-    quantities += samples.channels.items()
+    quantities = [*samples.measured.items(), *samples.channels.items()]
     header = ['time', *(f'{drive}/{name}' for name, _ in quantities for drive in samples.drives)]
     write_table(path, header, [samples.time, *(values for _, values in quantities)])

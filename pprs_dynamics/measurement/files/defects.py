@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +36,7 @@ MOSTLY_SATURATED = 0.9
 SLOW_STEP = 0.1
 # From this step [s] on stamps are rather of a smaller unit, in which the step is short enough.
 OTHER_UNIT_STEP = 1.0
+UNITS = {'position': 'm', 'velocity': 'm/s', 'effort': 'N'}  # of drives that push
 STAMP_UNITS = {'milliseconds': 1e3, 'microseconds': 1e6, 'nanoseconds': 1e9}
 
 
@@ -97,7 +97,7 @@ class Judgement:
         if np.all(mask):
             return
         before = np.concatenate(([0], np.cumsum(mask)))
-        self.samples = _taken(self.samples, mask)
+        self.samples = self.samples.taken(mask)
         starts = np.unique(before[self._starts])
         self._starts = starts[starts < max(len(self.samples.time), 1)]
 
@@ -147,7 +147,7 @@ class Judgement:
         late = stamps.late_samples(time, self._starts)
         self._tell_samples('unordered_stamps', late, 'out of order', noun='stamp')
         if np.any(late):
-            self.samples = _taken(self.samples, stamps.sorted_order(time, self._starts))
+            self.samples = self.samples.taken(stamps.sorted_order(time, self._starts))
         same = stamps.duplicates(self.samples.time)
         self._tell_samples('duplicate_stamps', same, 'with the stamp of another')
         self._keep(~same)
@@ -317,18 +317,7 @@ class Judgement:
 
 def _quantities(samples: Samples) -> list[tuple[str, str, NDArray[np.float64]]]:
     """Return what is measured, with its unit where drives push, and its values, (N, D)."""
-    return [(quantity, unit, values) for quantity, unit, values in (
-        ('position', 'm', samples.position), ('velocity', 'm/s', samples.velocity),
-        ('effort', 'N', samples.effort)) if values is not None]
-
-
-def _taken(samples: Samples, index: Indices | Mask) -> Samples:
-    """Return the samples of an index or mask."""
-    return replace(
-        samples, time=samples.time[index], position=samples.position[index],
-        velocity=None if samples.velocity is None else samples.velocity[index],
-        effort=samples.effort[index],
-        channels={name: values[index] for name, values in samples.channels.items()})
+    return [(quantity, UNITS[quantity], values) for quantity, values in samples.measured.items()]
 
 
 def _percent(count: int, total: int) -> str:

@@ -9,9 +9,8 @@ import hashlib
 from os import PathLike
 from pathlib import Path
 
-from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.system.files import require_file
+from pprs_dynamics.system.files import readable, require_file
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
@@ -23,7 +22,7 @@ def fingerprint(path: str | PathLike[str]) -> str:
         Where it cannot be read.
     """
     path = Path(path)
-    try:
+    with readable(path):
         if not path.is_dir():
             require_file(path)
             with path.open('rb') as file:
@@ -33,13 +32,11 @@ def fingerprint(path: str | PathLike[str]) -> str:
             name = file_path.relative_to(path).as_posix()
             whole.update(f'{name}\0{fingerprint(file_path)}\n'.encode())
         return whole.hexdigest()
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
 
 
 def samples_fingerprint(recording: Recording) -> str:
     """Return the hash of a recording that came from no file."""
     whole = hashlib.sha256(repr((recording.drives, recording.epoch)).encode())
-    for values in (recording.time, recording.position, recording.velocity, recording.effort):
-        whole.update(b'' if values is None else values.astype('<f8').tobytes())
+    for values in (recording.time, *recording.measured.values()):
+        whole.update(values.astype('<f8').tobytes())
     return whole.hexdigest()

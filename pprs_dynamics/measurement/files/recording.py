@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array, as_numbers
 from pprs_dynamics.drives import CHANNELS, DRIVES, DriveColumns, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_files import read_bag, write_bag
-from pprs_dynamics.measurement.files.bag_storage import is_storage
+from pprs_dynamics.measurement.files.bag_storage import is_bag
 from pprs_dynamics.measurement.files.csv_files import write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.samples import Defect, Indices, Progress, Samples
 from pprs_dynamics.measurement.files.table_files import read_table
+from pprs_dynamics.system.files import readable
 from pprs_dynamics.system.plain_text import counted, displayed
 
 # Of files that are written, and looked for in folders.
@@ -67,9 +67,8 @@ class Recording(Samples):
         if self.time.ndim != 1:
             raise MotionError('time', f'its shape is {self.time.shape}', 'be (N,)', 'shape')
         shape = (len(self.time), len(self.drives))
-        for quantity, values in (('position', self.position), ('velocity', self.velocity),
-                                 ('effort', self.effort), *self.channels.items()):
-            if values is not None and values.shape != shape:
+        for quantity, values in (*self.measured.items(), *self.channels.items()):
+            if values.shape != shape:
                 raise MotionError(quantity, f'its shape is {values.shape}', f'be {shape}', 'shape')
 
     @classmethod
@@ -214,18 +213,10 @@ def read_recording(
     path = Path(path)
     if not isinstance(drives, RecordedDrives):
         drives = RecordedDrives(tuple(drives))
-    try:
-        # A name that promises a bag is read as one, for the reason why it is none.
-        is_table = is_lerobot(path) or bool(drives.columns and drives.columns.files)
-        is_bag = not is_table and is_storage(path)
-        if not path.is_dir() and not path.stat().st_size:
-            raise UnreadableFileError(path, 'the file is empty')
-        samples = (read_bag(path, drives, topic, progress) if is_bag
-                   else read_table(path, drives, topic, progress))
-    except OSError as error:
-        if isinstance(error, UnreadableFileError):
-            raise
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    with readable(path):
+        read = (read_bag if is_bag(path) and not (drives.columns and drives.columns.files)
+                else read_table)
+        samples = read(path, drives, topic, progress)
     samples, applied = _as_efforts(path, _scaled(samples, drives), drives)
     recording = replace(_judged(displayed(path.name), replace(
         samples, units=drives.units, effort_limits=drives.effort_limits)),

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,6 +188,18 @@ class Samples:
                    np.where(in_amperes, of(CURRENT), of('effort')), epoch + whole, source, findings,
                    in_amperes, channels={name: of(name) for name in CHANNELS if any(
                        np.isfinite(columns.get((drive, name), none)).any() for drive in drives)})
+
+    @property
+    def measured(self) -> dict[str, Array]:
+        """Return position, velocity where there is any, and effort by name, (N, D)."""
+        return {name: values for name in QUANTITIES
+                if (values := getattr(self, name)) is not None}
+
+    def taken(self, index: Indices | Mask) -> Self:
+        """Return the samples of an index or a mask."""
+        arrays: Any = {name: values[index] for name, values in self.measured.items()}
+        return replace(self, time=self.time[index], **arrays, channels={
+            name: values[index] for name, values in self.channels.items()})
 
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""

@@ -40,7 +40,7 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
     rotation_of,
 )
-from pprs_dynamics.system.files import require_file
+from pprs_dynamics.system.files import readable, require_file
 
 WORLD = 'world'
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
@@ -65,14 +65,10 @@ def read_content(path: str) -> bytes:
     """Return the content of a file of a description, or raise UnreadableFileError."""
     file = Path(path)
     require_file(file)
-    try:
+    with readable(path):
         if file.stat().st_size > LARGEST_FILE:
             raise UnreadableFileError(path, f'more than {LARGEST_FILE / 1e6:.0f} MB: no URDF')
         return file.read_bytes()
-    except OSError as error:
-        if isinstance(error, UnreadableFileError):
-            raise
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
 
 
 def read_urdf(path: str) -> Description:
