@@ -25,7 +25,7 @@ KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy'
          '.json': 'JSON', '.jsonl': 'JSON', '.ndjson': 'JSON'}
 BYTES_PER_CHARACTER = 8  # of JSON in memory
 INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
-DEEPEST = 6  # structures within structures of a MAT file
+DEEPEST = 6  # objects within objects of a JSON file that are searched for a table
 LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joints for three hours
 WIDEST = 64  # elements of a list that may be joints
 ELEMENT = re.compile(r'(.+)\[(\d+)\]')
@@ -236,35 +236,13 @@ def _plain(values: Any) -> Any:
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
-    require_size(path, _mat_size(path))
-    content = loadmat(path, squeeze_me=True, struct_as_record=False)
-    return dict(_fields({name: value for name, value in content.items()
+    # Headers have the sizes.
+    require_size(path, sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
+    content = loadmat(path, squeeze_me=True, simplify_cells=True)
+    return dict(_leaves({name: value for name, value in content.items()
                          if not name.startswith('__')}))
-
-
-def _mat_size(path: Path) -> int:
-    """Return the bytes of the variables by the headers of a MAT file."""
-    from scipy.io import whosmat
-
-    return sum(8 * math.prod(shape) for _, shape, _ in whosmat(path))
-
-
-def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
-            ) -> Iterator[tuple[str, Any]]:
-    """Yield arrays of structures within structures, by their full names."""
-    for name, value in content.items():
-        if hasattr(value, '_fieldnames'):
-            if depth < DEEPEST:
-                yield from _fields({field: getattr(value, field) for field in value._fieldnames},
-                                   f'{before}{name}.', depth + 1)
-        elif (isinstance(value, np.ndarray) and value.dtype == object
-              and value.ndim == 1 and len(value) and hasattr(value[0], '_fieldnames')):
-            yield from _fields({f'{name}[{k}]': item for k, item in enumerate(value)}, before,
-                               depth + 1)
-        else:
-            yield f'{before}{name}', value
 
 
 def _numpy(path: Path) -> dict[str, Any]:
@@ -292,14 +270,19 @@ def _json(path: Path) -> dict[str, Any]:
     return table
 
 
-def _cells(row: Mapping[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of an object by `name.name`, of objects in a list by `name[0].name`."""
-    for name, value in row.items():
+def _leaves(content: Mapping[str, Any], before: str = '', title: str = '',
+            ) -> Iterator[tuple[str, Any]]:
+    """Yield what is in structures by `name.name`, of those in a list by `name[0].name`.
+
+    With a title, a structure in a list that has an entry of that name is called by it.
+    """
+    for name, value in content.items():
         if isinstance(value, Mapping):
-            yield from _cells(value, f'{before}{name}.')
+            yield from _leaves(value, f'{before}{name}.', title)
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            for k, each in enumerate(value):
-                yield from _cells(each, f'{before}{name}[{each.get("name", k)}].')
+            yield from _leaves({
+                f'{name}[{item.get(title, k) if isinstance(item, Mapping) else k}]': item
+                for k, item in enumerate(value)}, before, title)
         else:
             yield f'{before}{name}', value
 
@@ -309,7 +292,8 @@ def _largest_table(content: Any, depth: int) -> dict[str, Any]:
     import pandas as pd
 
     if isinstance(content, list) and content and isinstance(content[0], Mapping):
-        frame = pd.DataFrame([dict(_cells(row)) for row in content if isinstance(row, Mapping)])
+        frame = pd.DataFrame([dict(_leaves(row, title='name')) for row in content
+                              if isinstance(row, Mapping)])
         content = {str(name): frame[name].tolist() for name in frame}
     elif not isinstance(content, Mapping) or not depth:
         return {}

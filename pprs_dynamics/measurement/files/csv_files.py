@@ -125,7 +125,7 @@ class CsvTable:
 
         def words(k: int) -> list[int]:
             """Return the places of a row's words, as names and states of a log are."""
-            return [at for at, cell in enumerate(rows[k]) if not _is_value(cell, decimal)]
+            return [at for at, cell in enumerate(rows[k]) if _value_of(cell, decimal) is None]
 
         def is_row(k: int) -> bool:
             return any(rows[k]) and 2 * len(words(k)) < len(rows[k])
@@ -146,7 +146,7 @@ class CsvTable:
     @property
     def numbers(self) -> int:
         """How many cells of the first row hold numbers or dates."""
-        return sum(bool(cell) and _is_value(cell, self.decimal) for cell in self.sample)
+        return sum(bool(cell) and _value_of(cell, self.decimal) is not None for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.
@@ -157,8 +157,8 @@ class CsvTable:
             If a row has another count of cells, or a cell is no number.
         """
         used = [place for column in wanted if (place := self.place(column)) is not None]
-        dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
-                 and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
+        dates = {k for k in used if k < len(self.sample) and CLOCK.search(self.sample[k])
+                 and _value_of(self.sample[k], self.decimal) is not None}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
         blocks, unpacked, row = [], 0, self.above + 1
         with text_of(self.path) as (file, raw):
@@ -177,27 +177,20 @@ class CsvTable:
 
     def series(self, most: int) -> Iterator[Series]:
         """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
-        found: list[list[float]] = []
+        found: list[list[float | None]] = []
         with text_of(self.path) as (file, _):
             for _ in range(self.above):
                 file.readline()
             for line in islice(file, most):
                 cells = cells_of(self.path, 0, line, self.separator) if line.strip() else []
                 if len(cells) == self.count:
-                    found.append([self._any(cell) for cell in cells])
+                    found.append([_value_of(cell, self.decimal) for cell in cells])
         if not found:
             raise UnreadableFileError(self.path, 'no samples below the header')
-        for k, values in enumerate(np.array(found).T):
+        for k, values in enumerate(np.array(found, dtype=float).T):
             if np.isfinite(values).any():
                 name = self.names[k] if self.names else ''
                 yield Series(name if self.names.count(name) == 1 and name else k + 1, name, values)
-
-    def _any(self, cell: str) -> float:
-        try:
-            return (parse_number(cell.replace(self.decimal, '.'))
-                    if _is_number(cell, self.decimal) else _seconds_of(cell))
-        except ValueError:
-            return float('nan')
 
     def place(self, column: Column) -> int | None:
         """Return the place of a column from 0; None where there is none."""
@@ -279,24 +272,12 @@ def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _is_number(cell: str, decimal: str) -> bool:
-    try:
-        parse_number(cell.replace(decimal, '.'))
-    except ValueError:
-        return False
-    return True
-
-
-def _is_date(cell: str) -> bool:
-    try:
-        _seconds_of(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_value(cell: str, decimal: str) -> bool:
-    return not cell or _is_number(cell, decimal) or _is_date(cell)
+def _value_of(cell: str, decimal: str) -> float | None:
+    """Return a number, or the seconds of a date; NaN for an empty cell, and None for words."""
+    for value_of in (lambda: parse_number(cell.replace(decimal, '.')), lambda: _seconds_of(cell)):
+        with suppress(ValueError):
+            return value_of()
+    return None
 
 
 def _seconds_of(date: str) -> float:

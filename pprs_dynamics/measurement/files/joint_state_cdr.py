@@ -29,16 +29,14 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 States = tuple[tuple[str, ...], Indices, list[Array]]
 
 
-@cache
-def _types() -> Any:
-    return message_types()
-
-
 def message_types() -> Any:
     """Return what ROS 2 itself defines, in a store of its own."""
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_KILTED)
+
+
+_types = cache(message_types)
 
 
 @dataclass(frozen=True)
