@@ -37,7 +37,7 @@ from pprs_dynamics.measurement.files.recording import (
 )
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import format_model
-from pprs_dynamics.simulation.export.exported_robot import export_robot, express, written
+from pprs_dynamics.simulation.export.exported_robot import export_robot, written
 from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
 
 DURATION = 40.0  # [s]
@@ -140,7 +140,7 @@ def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
 def _write_model(robot: str, model: DriveModel, folder: Path) -> None:
     if robot == '3-PPRS':
         (folder / 'model.yaml').write_text(format_model(model.values))
-        robot = export_robot(express(model, 'mjcf'))
+        robot = export_robot(model, 'mjcf')
         (folder / 'model.xml').write_text(written(robot, 'mjcf'))
         return
     source = model_of(robot)

@@ -25,7 +25,6 @@ from pprs_dynamics.simulation.export.exported_robot import (
     URDF,
     TreePositions,
     export_robot,
-    express,
     written,
 )
 from pprs_dynamics.simulation.export.replay import DURATION, replay
@@ -37,11 +36,11 @@ NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 
 
 
 def text_of(model: Any, kind: str) -> str:
-    return written(export_robot(express(model, kind)), kind)
+    return written(export_robot(model, kind), kind)
 
 
 def replay_error(model: DriveModel, kind: str) -> float:
-    robot = export_robot(express(model, kind))
+    robot = export_robot(model, kind)
     return float(replay(model, robot, written(robot, kind), kind).error.max())
 
 
@@ -136,8 +135,7 @@ def test_mujoco_needs_the_forces_of_the_model_where_all_is_expressed(
     more: dict[str, Any], motion: Any,
 ) -> None:
     model = paper(**NO_LOADS, **more)
-    expressed = express(model, MJCF)
-    assert expressed.not_expressed == ()
+    assert export_robot(model, MJCF).not_expressed == ()
     found, expected = efforts_by_mujoco(text_of(model, MJCF), model, motion)
     assert found == pytest.approx(expected, abs=EXACT * np.abs(expected).max())
 

@@ -22,7 +22,6 @@ from pprs_dynamics.simulation.export.exported_robot import (
     MJCF,
     URDF,
     export_robot,
-    express,
     written,
 )
 from pprs_dynamics.simulation.export.replay import Replayed, replay
@@ -56,26 +55,26 @@ def run(options: argparse.Namespace) -> int:
            for path in described):
         raise UsageError(f'{displayed(options.output)}: {displayed(options.file)} reads the robot '
                          'from it, must be another name for --output')
-    expressed = express(model, options.to)
-    robot = export_robot(expressed)
+    robot = export_robot(model, options.to)
     text = written(robot, options.to)
     found = replay(model, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
         write_json(options.json, {'format': options.to, 'output': options.output,
-                                  'not_expressed': list(expressed.not_expressed),
+                                  'not_expressed': list(robot.not_expressed),
                                   **found.to_dict()})
-    _say(screen, found, expressed.not_expressed)
+    _say(screen, model, found, robot.not_expressed)
     screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0
 
 
-def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
+def _say(screen: Any, model: DriveModel, found: Replayed, left: tuple[str, ...]) -> None:
     screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
         ('drive', 'effort', 'error'),
         [(shown(name), *(f'{number:.3g} {unit}' for number in numbers))
-         for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
-                                         strict=True)]))
+         for name, unit, *numbers in zip(
+             model.drives, (units.effort for units in model.units), found.effort, found.error,
+             strict=True)]))
     more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
     screen.print(f'Not expressed in the file: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

@@ -274,9 +274,10 @@ def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:
 
 def _value_of(cell: str, decimal: str) -> float | None:
     """Return a number, or the seconds of a date; NaN for an empty cell, and None for words."""
-    for value_of in (lambda: parse_number(cell.replace(decimal, '.')), lambda: _seconds_of(cell)):
-        with suppress(ValueError):
-            return value_of()
+    with suppress(ValueError):
+        return parse_number(cell.replace(decimal, '.'))
+    with suppress(ValueError):
+        return _seconds_of(cell)
     return None
 
 

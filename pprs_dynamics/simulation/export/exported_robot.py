@@ -53,36 +53,18 @@ OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
 Joints = dict[str, dict[str, float]]
 
 
-@dataclass(frozen=True)
-class Expressed:
-    """A model as far as a format can hold it.
-
-    Parameters
-    ----------
-    model : DriveModel
-        The whole one.
-    robot : Mechanism or ThreePprs
-        With the bodies and the gravity that the format holds.
-    joints : dict of str to dict of str to float
-        Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
-        it has them.
-    not_expressed : tuple of str
-        Keys of the model file and names of effects; of robots with loops in URDF, their loops.
-    """
-
-    model: DriveModel
-    robot: Any
-    joints: Joints
-    not_expressed: tuple[str, ...]
-
-
-def express(model: DriveModel, kind: str) -> Expressed:
+def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
     """Return what a format can hold of a model.
 
     Parameters
     ----------
     model : DriveModel
     kind : {'urdf', 'mjcf'}
+
+    Raises
+    ------
+    ModelError
+        For bodies that no real ones are, and closures that no format has.
     """
     joints: Joints = {}
     left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
@@ -105,7 +87,9 @@ def express(model: DriveModel, kind: str) -> Expressed:
         robot = replace(robot, gravity=STANDARD_GRAVITY)
         left += ([loop.name for loop in model.robot.structure.loops] if model.moves_joints
                  else list(BALLS))
-    return Expressed(model, robot, {
+    name, mechanism = (ROBOT, robot) if model.moves_joints else (
+        'three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts))
+    return described(name, mechanism, {
         name: {key: value for key, value in numbers.items() if value}
         for name, numbers in joints.items()}, tuple(left))
 
@@ -250,16 +234,20 @@ class ExportedRobot:
     ----------
     name : str
     mechanism : Mechanism
-    joints : mapping of str to mapping
-        See `Expressed`.
+    joints : mapping of str to mapping of str to float
+        Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
+        it has them.
     bodies : tuple of Body
         Parents first.
+    not_expressed : tuple of str
+        Keys of the model file and names of effects; of robots with loops in URDF, their loops.
     """
 
     name: str
     mechanism: Mechanism
     joints: Mapping[str, Mapping[str, float]]
     bodies: tuple[Body, ...]
+    not_expressed: tuple[str, ...]
 
     @property
     def frames(self) -> Iterator[tuple[str, int, Frame]]:
@@ -271,25 +259,10 @@ class ExportedRobot:
                 yield name, row, frame
 
 
-def export_robot(expressed: Expressed) -> ExportedRobot:
-    """Return the robot that a file describes.
-
-    Raises
-    ------
-    ModelError
-        For bodies that no real ones are, and closures that no format has.
-    """
-    model, robot = expressed.model, expressed.robot
-    if model.moves_joints:
-        return described(ROBOT, robot, expressed.joints)
-    return described('three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts),
-                     expressed.joints)
-
-
 def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
-              ) -> ExportedRobot:
-    """Return a mechanism as files of simulators describe it; `joints` as of `Expressed`."""
-    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)))
+              not_expressed: tuple[str, ...] = ()) -> ExportedRobot:
+    """Return a mechanism as files of simulators describe it; see `ExportedRobot`."""
+    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)), not_expressed)
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -372,7 +345,7 @@ class TreePositions:
     """
 
     def __init__(self, model: DriveModel) -> None:
-        robot = export_robot(express(model, URDF))
+        robot = export_robot(model, URDF)
         self._mechanism = robot.mechanism
         joints = [body for body in robot.bodies if body.kind != FREE]
         free = [body for body in robot.bodies if body.kind == FREE]
@@ -442,9 +415,8 @@ def _drawn(robot: ExportedRobot) -> Mapping[int, list[Array]]:
     for body in robot.bodies:
         if body.kind != FREE:
             points[body.parent].append(body.frame.p)
-    for k in range(len(structure.loops)):
-        points[int(t.loop_a[k])].append(t.a_p[k])
-        points[int(t.loop_b[k])].append(t.b_p[k])
+    for row, p in zip((*t.loop_a, *t.loop_b), (*t.a_p, *t.b_p), strict=True):
+        points[int(row)].append(p)
     width = THICKNESS * structure.size
     return {row: [point for point in those if np.linalg.norm(point) > width]
             for row, those in points.items()}

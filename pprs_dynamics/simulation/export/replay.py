@@ -76,17 +76,12 @@ class Replayed:
 
     Parameters
     ----------
-    drives : tuple of str
-    units : tuple of str
-        Of their efforts.
     error : (D,) array
         Root mean square of the model's efforts less those of the file [N, N m].
     effort : (D,) array
         Root mean square of the model's efforts.
     """
 
-    drives: tuple[str, ...]
-    units: tuple[str, ...]
     error: Array
     effort: Array
 
@@ -98,16 +93,11 @@ class Replayed:
 
 def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Replayed:
     """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
-    state, motion = model.initial_state(), _excitation(model)
+    motion: Any = (draw_motion(model, DURATION, 0) if model.moves_joints else Excitation(
+        duration=DURATION).motion(np.arange(0.0, DURATION, 1 / RATE)))
+    state = model.initial_state()
     forces = model.measured(model.drive_forces(motion, state), state)
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
     error, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
         forces.total - by_file, forces.total))
-    return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, effort)
-
-
-def _excitation(model: DriveModel) -> Any:
-    time = np.arange(0.0, DURATION, 1 / RATE)
-    if model.moves_joints:
-        return draw_motion(model, DURATION, 0)
-    return Excitation(duration=DURATION).motion(time)
+    return Replayed(error, effort)
