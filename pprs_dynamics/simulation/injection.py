@@ -57,6 +57,7 @@ SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]
 COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
 PICK_UP_TIME = 0.2  # [s], in which the tool takes the weight of a payload
+LEAST_SPEED = 1e-6  # [m/s] of a tool, below which it is on the axes of all joints
 RANDOM = 'random'
 
 
@@ -623,6 +624,8 @@ def _tool_drag(run: Injection) -> Injected:
     velocity = run.engine.tool_velocity(run.engine.closed(run.motion))
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     top = float(speed.max())
+    if top < LEAST_SPEED:
+        raise InjectedEffectError('tool_drag needs a tool that is off the axes of the joints')
     sizes = run.sizes(lambda: {'turbulent_velocity': 2 * top, 'coefficient': run.size(
         0.03, 0.1) * float(np.abs(run.plain.effort).max()) / top})
     turbulent, coefficient = sizes.values()

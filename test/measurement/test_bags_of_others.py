@@ -186,3 +186,9 @@ def test_efforts_on_two_other_topics_are_a_question(tmp_path: Path) -> None:
 
     with pytest.raises(UnreadableFileError, match='/asked, /felt each have the effort of a'):
         read(ros2(tmp_path / 'bag', three))
+
+
+def test_dynamic_states_beside_those_of_other_hardware_are_read(tmp_path: Path) -> None:
+    path = ros2(tmp_path / 'bag', lambda k: {
+        '/dynamic_joint_states': currents(k, 'effort'), '/tool/states': currents(k, 'effort')})
+    assert_read(read(path))

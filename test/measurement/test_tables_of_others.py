@@ -355,3 +355,12 @@ def test_a_table_below_a_preamble_with_a_line_of_units(tmp_path: Path) -> None:
     found = read_recording(run, DriveModel.load(path).recorded)
     np.testing.assert_allclose(found.position, ANGLES)
     np.testing.assert_allclose(found.effort, LOADS)
+
+
+def test_a_time_of_day_of_digits_without_end_is_no_date(tmp_path: Path) -> None:
+    content, keys = TEXTS['ISO 8601']
+    rows = content.splitlines()
+    rows[6] = f'12:{9**30},' + rows[6].partition(',')[2]
+    (tmp_path / 'run.csv').write_text('\n'.join(rows))
+    with pytest.raises(UnreadableFileError, match='row 7, column t must hold a number'):
+        read(tmp_path / 'run.csv', keys)

@@ -14,6 +14,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 from model_recordings import with_effects
+from planar_arm import planar_arm
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.app.commands.pprs import main
@@ -247,3 +248,8 @@ def test_given_drives_have_the_effect() -> None:
         with pytest.raises(InjectedEffectError, match=text):
             Injection(plain, [named(words, np.random.default_rng(0), 1.0)],
                       np.random.default_rng(2))
+
+
+def test_a_tool_on_the_axis_of_its_joint_has_no_drag(tmp_path: Path) -> None:
+    with pytest.raises(InjectedEffectError, match='tool_drag needs a tool that is off the axes'):
+        simulate_mechanism(planar_arm(tmp_path, 1), ('tool_drag',), 0, duration=4.0)

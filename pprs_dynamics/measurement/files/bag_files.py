@@ -225,25 +225,25 @@ def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
     """Return the connections of the one topic to be read."""
     path = bag.path
     states = [item for item in bag.connections if item.msgtype == JOINT_STATE]
-    controllers = [item for item in bag.connections
-                   if item.msgtype in CONTROLLER_TYPES and item.msgcount]
-    if topic is not None:
-        states += controllers
-    elif not states and len({item.topic for item in controllers}) == 1:
-        return controllers
-    topics = sorted({item.topic for item in states or controllers})
+    topics: dict[str, list[Connection]] = {}
+    for item in sorted(bag.connections, key=lambda item: item.topic):
+        if item.msgtype == JOINT_STATE or (
+                item.msgtype in CONTROLLER_TYPES and item.msgcount and (topic or not states)):
+            topics.setdefault(item.topic, []).append(item)
     if topic is not None:
         matching = [name for name in topics if name.strip('/') == topic.strip('/')]
         if not matching:
             raise UnreadableFileError(
                 path, f'there is no sensor_msgs/JointState on {topic}'
                 + (f', but on {", ".join(topics)}' if topics else ''))
+    elif not states and len(topics) == 1:
+        matching = [*topics]
     else:
         matching = [name for name in topics if name.endswith(TOPIC_END)
                     and channel_of(name, JOINT_STATE) is None]
         # Topics that were announced and stayed silent are no choice.
-        filled = {item.topic for item in states if item.msgcount}
-        matching = [name for name in matching if name in filled] or matching
+        matching = [name for name in matching
+                    if any(item.msgcount for item in topics[name])] or matching
         if not matching:
             arrays = sorted({item.topic for item in bag.connections
                              if item.msgtype.endswith('MultiArray')})
@@ -255,7 +255,7 @@ def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
     if len(matching) > 1:
         raise UnreadableFileError(
             path, f'there are joint states on {", ".join(matching)}: choose one with topic')
-    return [item for item in states if item.topic == matching[0]]
+    return topics[matching[0]]
 
 
 def _tell_missing(

@@ -294,7 +294,11 @@ def _seconds_of(date: str) -> float:
     try:
         moment = datetime.fromisoformat(date.replace(',', '.'))
     except ValueError:
-        moment = parse_date(date, default=datetime(1970, 1, 1), dayfirst='.' in date.split(':')[0])
+        try:
+            moment = parse_date(date, default=datetime(1970, 1, 1),
+                                dayfirst='.' in date.split(':')[0])
+        except ArithmeticError:  # of digits without end
+            raise ValueError(date) from None
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
