@@ -325,11 +325,11 @@ def write_recording(
 def describe(recording: Recording) -> Summary:
     """Return a summary of a recording: rates, duration, ranges, findings."""
     time = recording.time
-    segments = tuple(
-        SegmentSummary(float(time[part.start]), float(time[part.stop - 1]),
-                       part.stop - part.start, float(1 / np.median(np.diff(time[part]))))
-        for part in recording.segments)
     steps = [np.diff(time[part]) for part in recording.segments]
+    segments = tuple(
+        SegmentSummary(float(time[part.start]), float(time[part.stop - 1]), len(own) + 1,
+                       float(1 / np.median(own)))
+        for part, own in zip(recording.segments, steps, strict=True))
     ranges = {}
     for k, drive in enumerate(recording.drives):
         position, effort = _range(recording.position[:, k]), recording.effort[:, k]

@@ -112,35 +112,38 @@ def smooth_drives(recording: Recording, window: float | None = None,
     recorded = better_recorded(stretches, smoothing)
     notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
 
-    parts: list[tuple[Array, Array, Array]] = []
-    used: list[SamplingGrid] = []
-    block_starts: list[np.ndarray] = []
-    index: list[np.ndarray] = []
-    count = 0
     duration = block_duration(motion_bandwidth(stretches, smoothing) if blocks_per_period
                               else 0.0, blocks_per_period)
     block = _block(recording, segments, grids, duration, notes)
+    pieces: list[tuple[np.ndarray, np.ndarray, SamplingGrid]] = []
     for part, grid in zip(segments, grids, strict=True):
         filter_ = smoothing.polynomial(grid.step)
         kept, starts = _blocks(grid, filter_.half, block or block_length(grid.step, duration))
         if len(starts):
-            parts.append(_drive_motion(recording, part, grid, filter_, kept, recorded))
-            block_starts.append(starts + count)
-            count += kept.stop - kept.start
-            index.append(np.arange(part.start + kept.start, part.start + kept.stop))
-            used.append(grid)
-    if not index:
+            pieces.append((np.arange(part.start + kept.start, part.start + kept.stop), starts,
+                           grid))
+    if not pieces:
         raise MotionError(
             'recording', f'its longest segment has {max(s.stop - s.start for s in segments)} '
             'samples', f'have more than {filter_.window}, one smoothing window', 'shape')
-    ends = np.cumsum([len(samples) for samples in index]).tolist()
-    spans = tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
-    longest = used[int(np.argmax([len(samples) for samples in index]))]
-    q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return DriveMotion(
-        q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
-        block or block_length(longest.step, duration), smoothing, tuple(used), recorded,
-        tuple(notes))
+    index, blocks, used = zip(*pieces, strict=True)
+    lengths = np.array(list(map(len, index)))
+    firsts = np.cumsum(lengths) - lengths
+    longest, none = used[int(np.argmax(lengths))], np.zeros(0)
+    motion = DriveMotion(
+        none, none, none, np.concatenate(index),
+        tuple(slice(first, first + count) for first, count in zip(
+            firsts.tolist(), lengths.tolist(), strict=True)),
+        np.concatenate([starts + first for starts, first in zip(blocks, firsts, strict=True)]),
+        block or block_length(longest.step, duration), smoothing, used, recorded, tuple(notes))
+    q, q_dot, q_ddot = smoothed_as(motion, recording, lambda position: position)
+    if np.any(recorded):
+        assert recording.velocity is not None
+        # A spline through NaN of one drive would take the others with it.
+        v, v_dot, _ = smoothed_as(motion, replace(recording, position=np.where(
+            recorded.any(axis=0), recording.velocity, 0.0)), lambda velocity: velocity)
+        q_dot, q_ddot = np.where(recorded[:, None], (v, v_dot), (q_dot, q_ddot))
+    return replace(motion, position=q, velocity=q_dot, acceleration=q_ddot)
 
 
 def _held_poses(recording: Recording) -> DriveMotion:
@@ -323,18 +326,3 @@ def _blocks(grid: SamplingGrid, edge: int, block: int) -> tuple[slice, np.ndarra
     if len(number) - starts[-1] < block:
         kept, starts = slice(kept.start, kept.start + int(starts[-1])), starts[:-1]
     return kept, starts
-
-
-def _drive_motion(
-    recording: Recording, part: slice, grid: SamplingGrid, filter_: LocalPolynomial, kept: slice,
-    recorded: np.ndarray,
-) -> tuple[Array, Array, Array]:
-    """Return smoothed position, velocity and acceleration at the kept samples of a segment."""
-    rates = list(filter_.differentiated(grid.at_steps(recording.position[part])))
-    for derivative, better in enumerate(recorded):
-        if np.any(better):
-            assert recording.velocity is not None
-            velocity = grid.at_steps(recording.velocity[part][:, better])
-            rates[derivative + 1][:, better] = filter_.filtered(velocity, derivative)
-    q, q_dot, q_ddot = (grid.at_samples(values, filter_.half, kept) for values in rates)
-    return q, q_dot, q_ddot

@@ -124,13 +124,12 @@ def find_grid(time: Array, position: Array) -> tuple[SamplingGrid, str]:
         return equal, told
     stamped = SamplingGrid(step, (time - time[0]) / step, jitter, missing)
     as_stamped = _noise(stamped, position)
-    what = f'stamps jitter by {jitter * 1e6:.3g} us rms; '
-    if np.sum(as_stamped ** 2) < CLEARLY_LESS ** 2 * np.sum(noise ** 2):
-        what += ('positions are smoother when the stamps are taken as true, and are '
-                 'interpolated to equal steps by a cubic spline')
-        return stamped, '. '.join(filter(None, (told, what)))
-    what += 'positions are no smoother when they are taken as true, so steps are taken as equal'
-    return equal, '. '.join(filter(None, (told, what)))
+    grid, what = (stamped, 'positions are smoother when the stamps are taken as true, and are '
+                  'interpolated to equal steps by a cubic spline') if (
+        np.sum(as_stamped ** 2) < CLEARLY_LESS ** 2 * np.sum(noise ** 2)) else (
+        equal, 'positions are no smoother when they are taken as true, so steps are taken as equal')
+    return grid, '. '.join(filter(None, (
+        told, f'stamps jitter by {jitter * 1e6:.3g} us rms; {what}')))
 
 
 def _noise(grid: SamplingGrid, position: Array) -> Array:
