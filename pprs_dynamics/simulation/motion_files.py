@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from pprs_dynamics.errors import MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.csv_files import CsvTable, cells_of, text_of
+from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.system.csv_tables import write_table
@@ -47,10 +47,8 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
         Where the poses are no motion: non-finite, off unit length, times not increasing.
     """
     require_file(path)
-    with text_of(Path(path)) as (file, _):
-        header = cells_of(Path(path), 1, file.readline(), ',')
-    columns = _columns(path, header)
-    table = CsvTable(Path(path), ',', '.', header, len(header), 1, [])
+    table = CsvTable.open(Path(path))
+    columns = _columns(path, table.names)
     numbers = np.stack(table.read(columns), axis=1)
     time, position, orientation = numbers[:, 0], numbers[:, 1:4], numbers[:, 4:8]
     try:
