@@ -108,9 +108,14 @@ def test_a_folder_of_split_bags_is_one_recording(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
-def test_a_packed_bag_is_read(mode: CompressionMode, tmp_path: Path) -> None:
-    assert_read(read(ros2(tmp_path / 'bag', states, lambda writer: writer.set_compression(
-        mode, CompressionFormat.ZSTD))))
+def test_a_packed_bag_is_read_also_without_its_metadata(
+    mode: CompressionMode, tmp_path: Path,
+) -> None:
+    path = ros2(tmp_path / 'bag', states, lambda writer: writer.set_compression(
+        mode, CompressionFormat.ZSTD))
+    assert_read(read(path))
+    (path / 'metadata.yaml').unlink()
+    assert_read(read(path))
 
 
 def test_a_packed_storage_file_alone_is_read(tmp_path: Path) -> None:
@@ -192,3 +197,12 @@ def test_dynamic_states_beside_those_of_other_hardware_are_read(tmp_path: Path) 
     path = ros2(tmp_path / 'bag', lambda k: {
         '/dynamic_joint_states': currents(k, 'effort'), '/tool/states': currents(k, 'effort')})
     assert_read(read(path))
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_position_that_is_not_finite_is_dropped_without_a_warning(tmp_path: Path) -> None:
+    def one(k: int) -> dict[str, Any]:
+        q = POSITION[k] if k != 5 else np.array([np.inf, 0.0])
+        return {'/joint_states': message(stamp(k), JOINTS, q, (), EFFORT[k])}
+
+    assert len(read(ros2(tmp_path / 'bag', one)).time) == N - 1

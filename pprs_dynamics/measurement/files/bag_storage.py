@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 # First bytes of a bare storage file, and the suffix by which rosbags knows it.
 MAGIC = {b'\x89MCAP': '.mcap', b'SQLite format 3\x00': '.db3', b'#ROSBAG V': '.bag'}
+ZSTANDARD_MAGIC = b'\x28\xb5\x2f\xfd'  # no message begins so
 SUFFIXES = ('.mcap', '.db3', '.bag')
 METADATA = 'metadata.yaml'  # in the folder of a rosbag2 recording
 
@@ -115,6 +116,8 @@ class Bag:
                 if not (isinstance(stamp, int) and isinstance(data, (bytes, memoryview))):
                     # A cell of sqlite is of any type, and a flipped bit makes it another one.
                     raise TypeError('a message is no bytes')
+                if data[:4] == ZSTANDARD_MAGIC:  # packed, which only lost metadata say
+                    data = zstd().decompress(data)
                 yield connection, stamp, bytes(data) if types is None else bytes(
                     types.ros1_to_cdr(data, connection.msgtype))
         except Exception as error:

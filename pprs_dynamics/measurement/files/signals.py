@@ -92,7 +92,7 @@ def find_jumps(samples: Samples) -> Jumps:
 
 def alternates(values: Array) -> bool:
     """Return whether positions (N,) are those of two motions in turn, as of two publishers."""
-    steps = np.diff(values)
+    steps = np.diff(values[np.isfinite(values)])
     if len(steps) < 2:
         return False
     back = np.abs(steps[1:] + steps[:-1]) < SPIKE_REMAINDER * np.abs(steps[1:])
