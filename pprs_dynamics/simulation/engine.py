@@ -31,7 +31,13 @@ from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_values import source_of_errors
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.engine_state import TOOL, EngineMotion, EngineState, add_sites
+from pprs_dynamics.simulation.engine_state import (
+    TOOL,
+    EngineMotion,
+    EngineState,
+    add_sites,
+    quaternion,
+)
 from pprs_dynamics.simulation.platform import PlatformMechanism
 
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
@@ -146,18 +152,13 @@ class MechanismEngine:
                               inertia=(LEAST, 1.1 * LEAST, 1.2 * LEAST))
         added.explicitinertial = True
 
-    def _quaternion(self, R: Array) -> Array:
-        quaternion = np.empty(4)
-        self.engine.mju_mat2Quat(quaternion, np.ascontiguousarray(R).ravel())
-        return quaternion
-
     def _set(self, body: int, parameters: Array) -> None:
         """Give a body of MuJoCo inertial parameters (10,), in its frame."""
         model = self.model
         mass, model.body_ipos[body], moments, axes = principal_inertia(parameters)
         model.body_mass[body] = max(mass, LEAST)
         model.body_inertia[body] = np.maximum(moments, LEAST)
-        model.body_iquat[body] = self._quaternion(axes)
+        model.body_iquat[body] = quaternion(self.engine, axes)
         self.engine.mj_setConst(model, self.data)
 
     def _require_agreement(self, model: DriveModel) -> None:

@@ -166,7 +166,7 @@ class EngineState:
         for q, v, row in self._free:
             position[:, q:q + 3] = (m.p[:, row] - root.p) @ root.R
             for place, R in zip(position, root.R.T @ m.R[:, row], strict=True):
-                self.engine.mju_mat2Quat(place[q + 3:q + 7], R.ravel())
+                place[q + 3:q + 7] = quaternion(self.engine, R)
             for own, linear, angular in ((velocity, m.u, m.w), (acceleration, m.ud, m.wd)):
                 own[:, v:v + 3] = linear[:, row] @ root.R
                 own[:, v + 3:v + 6] = np.einsum('nji,nj->ni', m.R[:, row], angular[:, row])
@@ -271,6 +271,12 @@ def add_sites(engine: Any, spec: Any, structure: Structure,
         for k, row in enumerate(rows)}
     for name, (row, frame) in sites.items():
         body, own = bodies[row]
-        there, quaternion = own.inverse @ frame, np.empty(4)
-        engine.mju_mat2Quat(quaternion, np.ascontiguousarray(there.R).ravel())
-        body.add_site(name=f'{SITE}{name}', pos=there.p, quat=quaternion)
+        there = own.inverse @ frame
+        body.add_site(name=f'{SITE}{name}', pos=there.p, quat=quaternion(engine, there.R))
+
+
+def quaternion(engine: Any, R: Array) -> Array:
+    """Return MuJoCo's quaternion of a rotation."""
+    found = np.empty(4)
+    engine.mju_mat2Quat(found, np.ascontiguousarray(R).ravel())
+    return found

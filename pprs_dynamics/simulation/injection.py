@@ -352,10 +352,9 @@ class Injection(Injecting):
 
 
 def simulate_mechanism(
-    model: DriveModel, names: Sequence[str], seed: int, scale: float = 1.0,
-    noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
-    progress: Callable[[float], None] | None = None, thermometers: bool = False,
-    link_encoders: bool = False, motion: JointMotion | None = None,
+    model: DriveModel, names: Sequence[str], seed: int, noise: float | None = None,
+    duration: float = 40.0, path_seed: int = 0, progress: Callable[[float], None] | None = None,
+    thermometers: bool = False, motion: JointMotion | None = None,
     nominal: JointMotion | None = None,
 ) -> MechanismRun:
     """Return a recording of a mechanism with injected effects.
@@ -368,8 +367,6 @@ def simulate_mechanism(
         Of `NAMES`, or 'random'. Drives may follow after a colon: 'coulomb_friction:a,b'.
     seed : int
         Of effects and noise.
-    scale : float
-        Multiplies the size of effects.
     noise : float, optional
         Standard deviation of all efforts [N m, N]; by default half a percent of the largest.
     duration : float
@@ -377,7 +374,7 @@ def simulate_mechanism(
     path_seed : int
         Of the motion.
     progress : callable, optional
-    thermometers, link_encoders : bool
+    thermometers : bool
         Whether they are recorded where no effect needs them.
     motion : JointMotion, optional
         In place of a random one.
@@ -393,7 +390,7 @@ def simulate_mechanism(
     read = draw_motion(model, duration, path_seed) if motion is None else motion
     choices = sorted((*(name for name in FORMS if able_joints(name, model, read)), 'payload_mass'))
     chosen = [str(random.choice(choices)) if name == RANDOM else name for name in names]
-    effects = [named(name, random, scale) for name in chosen]
+    effects = [named(name, random, 1.0) for name in chosen]
     # Generators of their own, so that no other draw depends on temperatures and second encoders.
     if nominal is not None and effects:
         Injection(PlainRobot(model, nominal), effects, np.random.default_rng((seed, CLIMATE)))
@@ -404,7 +401,7 @@ def simulate_mechanism(
     channels = {}
     if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
         channels['temperature'] = read_thermometers(run.time, run.temperature)
-    if link_encoders or 'elastic_joint' in chosen:
+    if 'elastic_joint' in chosen:
         second = np.random.default_rng((seed, SECOND))  # mounted at another angle
         channels['link_position'] = (
             run.motion.position + run.lead + run.shift

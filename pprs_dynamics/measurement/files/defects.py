@@ -92,6 +92,11 @@ class Judgement:
         self._tell(kind, count, f'{counted(count, noun)} {what}',
                    stamps.runs(mask & np.isfinite(self.samples.time)), drives)
 
+    def _tell_values(self, kind: str, mask: Mask, what: str) -> None:
+        """Add a finding about the values of a mask (N, D); {} in the clause is for their drives."""
+        drives = self._named(np.any(mask, axis=0))
+        self._tell_samples(kind, np.any(mask, axis=1), what.format(', '.join(drives)), drives)
+
     def _keep(self, mask: Mask) -> None:
         """Drop samples, and move the starts of stretches with them."""
         if np.all(mask):
@@ -115,24 +120,19 @@ class Judgement:
             if not np.any(bad):
                 continue
             largest = float(np.abs(values[bad]).max())
-            drives = self._named(np.any(bad, axis=0))
             values[bad] = np.nan
             article = 'an' if quantity == 'effort' else 'a'
             unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), unit)
-            self._tell_samples(f'impossible_{quantity}', np.any(bad, axis=1),
-                               f'with {article} {quantity} of {", ".join(drives)} up to '
-                               f'{largest:.3g} {unit}, far from all others,', drives)
+            self._tell_values(f'impossible_{quantity}', bad, f'with {article} {quantity} of {{}} '
+                              f'up to {largest:.3g} {unit}, far from all others,')
 
     def _drop_non_finite(self) -> None:
         bad_time = ~np.isfinite(self.samples.time)
         self._tell_samples('non_finite_time', bad_time, 'without a finite time')
         self._keep(~bad_time)
         bad = ~np.isfinite(self.samples.position)
-        rows = np.any(bad, axis=1)
-        drives = self._named(np.any(bad, axis=0))
-        self._tell_samples('non_finite_position', rows,
-                           f'without a finite position of {", ".join(drives)}', drives)
-        self._keep(~rows)
+        self._tell_values('non_finite_position', bad, 'without a finite position of {}')
+        self._keep(~np.any(bad, axis=1))
 
     def _order(self) -> None:
         time = self.samples.time
@@ -174,10 +174,8 @@ class Judgement:
                        f'{size:.4g} {self.samples.unit_of(drive, "m")},',
                        [(first, first) for first, _ in jumps], [name])
         self._split(np.array([first for first, _, _ in found.jumps], dtype=np.int64))
-        drives = [self.samples.drives[drive] for drive in sorted(found.spike_drives)]
-        self._tell_samples('position_spike', found.spikes,
-                           f'with a spike in the position of {", ".join(drives)}', drives)
-        self._keep(~found.spikes)
+        self._tell_values('position_spike', found.spikes, 'with a spike in the position of {}')
+        self._keep(~np.any(found.spikes, axis=1))
 
     def _judge_spacing(self) -> None:
         time = self.samples.time
@@ -233,12 +231,10 @@ class Judgement:
         zeros, usual = zip(*(signals.lost_to_zero(effort[:, drive])
                              for drive in range(len(samples.drives))), strict=True)
         lost = np.column_stack(zeros)
-        rows = np.any(lost, axis=1)
         # What is 0 at the same moment was lost with it.
-        lost |= rows[:, None] & (np.abs(effort) <= np.array(usual))
-        drives = self._named(np.any(lost, axis=0))
-        self._tell_samples('effort_zero', rows, f'in which the effort of {", ".join(drives)} is '
-                           '0 and far from it before and after', drives)
+        lost |= np.any(lost, axis=1)[:, None] & (np.abs(effort) <= np.array(usual))
+        self._tell_values('effort_zero', lost, 'in which the effort of {} is 0 and far from it '
+                          'before and after')
         effort[lost] = np.nan
 
     def _leave_out_saturated(self) -> None:

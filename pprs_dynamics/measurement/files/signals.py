@@ -50,23 +50,19 @@ class Jumps:
 
     Parameters
     ----------
-    spikes : (N,) mask
-        Samples that lie apart from both their sides.
+    spikes : (N, D) mask
+        Positions that lie apart from both their sides.
     jumps : list of (sample, drive, size)
         The first sample after each lasting jump [m].
-    spike_drives : set of int
-        Drives with spikes.
     """
 
     spikes: Mask
     jumps: list[tuple[int, int, float]]
-    spike_drives: set[int]
 
 
 def find_jumps(samples: Samples) -> Jumps:
     """Return spikes and jumps of all drives; where the clock was set back there is none."""
-    count = len(samples.time)
-    found = Jumps(np.zeros(count, dtype=bool), [], set())
+    found = Jumps(np.zeros(samples.position.shape, dtype=bool), [])
     steps = np.diff(samples.time)
     for drive in range(len(samples.drives)):
         moved = np.diff(samples.position[:, drive])
@@ -83,8 +79,7 @@ def find_jumps(samples: Samples) -> Jumps:
                 found.jumps.append((int(first) + 1, drive, float(moved[first])))
                 at += 1
             else:
-                found.spikes[first + 1:back + 1] = True
-                found.spike_drives.add(drive)
+                found.spikes[first + 1:back + 1, drive] = True
                 at = int(np.searchsorted(fast, back)) + 1
     found.jumps.sort()
     return found
