@@ -364,3 +364,14 @@ def test_a_time_of_day_of_digits_without_end_is_no_date(tmp_path: Path) -> None:
     (tmp_path / 'run.csv').write_text('\n'.join(rows))
     with pytest.raises(UnreadableFileError, match='row 7, column t must hold a number'):
         read(tmp_path / 'run.csv', keys)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize(('zone', 'offset'), [
+    ('', 0), ('Z', 0), ('UTC', 0), ('+02:00', -7200), ('PST', 0), ('CET', 0)])
+def test_dates_have_the_offset_that_they_state(zone: str, offset: int, tmp_path: Path) -> None:
+    content, keys = TEXTS['ISO 8601']
+    (tmp_path / 'run.csv').write_text(content.replace('T', ' ').replace('+00:00', f' {zone}'))
+    recording = read(tmp_path / 'run.csv', keys)
+    assert_read(recording, 1e-6)
+    assert recording.epoch == EPOCH + offset

@@ -282,7 +282,7 @@ def _value_of(cell: str, decimal: str) -> float | None:
 
 
 def _seconds_of(date: str) -> float:
-    """Return seconds since 1970 of a date with a time of day, UTC if it has no zone.
+    """Return seconds since 1970 of a date with a time of day, UTC if it has no offset.
 
     A time of day alone counts from midnight; an empty cell is NaN. The day is first where points
     are between the numbers, as in German.
@@ -295,8 +295,9 @@ def _seconds_of(date: str) -> float:
         moment = datetime.fromisoformat(date.replace(',', '.'))
     except ValueError:
         try:
-            moment = parse_date(date, default=datetime(1970, 1, 1),
-                                dayfirst='.' in date.split(':')[0])
+            # By default names of zones mean other things on every machine.
+            moment = parse_date(date, default=datetime(1970, 1, 1), dayfirst='.' in date.split(
+                ':')[0], tzinfos=lambda name, offset: offset)
         except ArithmeticError:  # of digits without end
             raise ValueError(date) from None
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
