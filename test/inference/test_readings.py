@@ -11,7 +11,7 @@ from pathlib import Path
 import made_up_arm
 import numpy as np
 import pytest
-from made_up_files import ARM, arm_efforts, motion
+from made_up_files import ARM, SLIDE, arm_efforts, motion
 
 from pprs_dynamics.app.api.diagnose import diagnose
 from pprs_dynamics.app.api.first_model import first_model
@@ -21,6 +21,7 @@ from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 DRIVES = ('shoulder', 'elbow')
@@ -118,6 +119,56 @@ def test_errors_of_position_and_external_torques_are_in_no_unit(arm: DriveModel,
     outside = told(arm, time, q, 0.1 * slow + 0.1 * noise)
     assert 'kN' not in lag + outside
     assert 'external torque' in outside or 'currents' not in outside
+
+
+def test_errors_of_position_of_the_platform_are_no_kilonewtons() -> None:
+    moved = Excitation(10.0, 2).motion(np.arange(0, 10.0, 0.005))
+    model = DriveModel.load()
+    forces = model.drive_forces(moved)
+    random = np.random.default_rng(1)
+    position, effort = (values + 1e-5 * np.abs(values).max(axis=0) * random.normal(
+        size=values.shape) for values in (forces.drive_motion[0], forces.total / 2000))
+    assert 'an error of position' in told(model, moved.time, position, effort)
+
+
+@pytest.mark.parametrize('constant', [0.04, 15.0])
+def test_efforts_far_from_the_inertia_of_a_lying_slide_are_a_question(
+    constant: float, tmp_path: Path,
+) -> None:
+    time, q, v, a = motion(np.random.default_rng(3), 1, 0.15)
+    force = 8 * a + 15 * v + 6 * np.tanh(v / 0.005) + np.random.default_rng(4).normal(
+        0, 0.03, q.shape)
+    (tmp_path / 'slide.urdf').write_text(SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"'))
+    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, q, force / constant]), delimiter=',',
+               comments='', header='time,pos,force')
+    first = first_model(tmp_path / 'slide.urdf', [tmp_path / 'run.csv'], tmp_path / 'a.yaml')
+    assert 'effort_scale' in ''.join(first.questions)
+
+
+def test_angles_in_degrees_beside_lengths_in_millimetres_are_read(tmp_path: Path) -> None:
+    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
+    time, q, v, a = motion(np.random.default_rng(2), 3, 1.0)
+    size, unit = np.array([0.8, 0.6, 0.25]), np.array([np.pi / 180, np.pi / 180, 1e-3])
+    force = made_up_arm.real_arm(tmp_path).drive_forces(
+        JointMotion(q * size, v * size, a * size, time)).total
+    effort = force + np.random.default_rng(3).normal(0, 0.1, q.shape)
+    found = find_mistakes(model, Recording.from_arrays(
+        'run', time, q * size / unit, None, effort, model.drives))
+    scales = {drive: value for each in found if isinstance(each, OtherReading)
+              for drive, _, value in each.scales}
+    assert scales == pytest.approx(dict(zip(model.drives, unit, strict=True)))
+
+
+def test_recorded_velocities_decide_between_units_of_positions(
+    arm: DriveModel, tmp_path: Path,
+) -> None:
+    """Amperes make ticks of another size as likely by the efforts alone."""
+    time, q, v, effort = run(5)
+    unit = 2 * np.pi / 1024
+    found = find_mistakes(arm, Recording.from_arrays(
+        'run', time, np.round(q / unit), v, effort / [11.1, 25.7], DRIVES))
+    assert f'{unit:.7g}' in '; '.join(
+        each.line + str(each.scales) for each in found if isinstance(each, OtherReading))
 
 
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:

@@ -96,12 +96,23 @@ def drawn(folder: Path, seed: int) -> Drawn:
     counts = (q - offset) / scale
     groups = [('q', np.round(counts) if is_counted else counts),
               *([('dq', v / scale)] if has_velocity else []), (name, recorded)]
+    # What was asked for some samples ago, accelerations, and a thermometer.
+    has_command, has_acceleration, has_more, lead = *(random.random(3) < (0.3, 0.2, 0.2)), (
+        random.integers(2, 6) / RATE)
+    if has_command:
+        ahead = (q + lead * v + lead ** 2 / 2 * a - offset) / scale
+        groups.insert(random.integers(len(groups) + 1),
+                      ('q_cmd', np.round(ahead) if is_counted else ahead))
+    if has_acceleration:
+        groups.insert(random.integers(len(groups) + 1), ('ddq', a / scale))
     if has_names:
         random.shuffle(groups)
     columns = [(f'{name}{j + 1}', values[:, j]) for j in range(q.shape[1])
                for name, values in groups] if interleaved else [
                    (f'{name}{j + 1}', values[:, j]) for name, values in groups
                    for j in range(q.shape[1])]
+    if has_more:
+        columns.append(('warmth', 30 + np.cumsum(random.normal(0, 1e-3, len(time)))))
     if has_time:
         columns.insert(0, ('time', time))
     path = folder / 'run.csv'

@@ -23,15 +23,15 @@ from pprs_dynamics.inference.readings.columns import (
     Guess,
     GuessError,
     guess_columns,
-    joint_in,
-    words_of,
 )
 from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
+from pprs_dynamics.inference.readings.names import joint_in, unit_of, words_of
 from pprs_dynamics.inference.readings.table import (
     COMMANDS,
     CURRENT,
     EFFORT,
     POSITION,
+    SAME_MASSES,
     SHARE,
     VELOCITY,
     WORDS,
@@ -229,7 +229,7 @@ def first_model(
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
-                given[0], files, contents, names, [*description.joints], chosen, rate)
+                given[0], files, contents, names, [*description.joints], draft.model, rate)
         except AmbiguousColumns as error:
             notes.append(str(error))
             draft.questions += error.lines
@@ -253,10 +253,10 @@ def first_model(
 def _correct(draft: FirstModel, path: Path) -> list[str]:
     """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
-    A kind of mistake that comes again after its correction is a question.
+    A mistake of a drive that comes again after its correction is a question.
     """
     notes: list[str] = []
-    corrected: set[str] = set()
+    corrected: set[tuple[str, str]] = set()
     while True:
         model = draft.model
         try:
@@ -266,7 +266,8 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
             return notes + draft.questions
         readings = [each for each in mistakes if isinstance(each, OtherReading)]
-        sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
+        sure = [each for each in readings if each.scales and each.kind in SURE_KINDS
+                and corrected.isdisjoint((each.kind, drive) for drive, _, _ in each.scales)]
         if not sure:
             draft.questions += [
                 each.what + (f': if so, write {line}' if line else '') for each in readings
@@ -275,7 +276,7 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
                 draft.questions += _questions_of_names(draft, model, recording)
             return notes + draft.questions
         for each in sure:
-            corrected.add(each.kind)
+            corrected |= {(each.kind, drive) for drive, _, _ in each.scales}
             draft.guessed.append(each.what)
             notes.append(each.what)
             for drive, key, value in each.scales:
@@ -298,8 +299,10 @@ def _questions_of_names(draft: FirstModel, model: DriveModel, recording: Recordi
         return [f'{", ".join(shares)}: a share of a torque or force that the file does not name. '
                 'Write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
                 f'columns: {{{draft.drives[0]}: {{effort_scale: 0.3}}}}']
-    factors = unlike_masses(model, recording) if any(
-        isinstance(column, int) for column in efforts.values()) else {}
+    unlike = unlike_masses(model, recording) if efforts else {}
+    factors = {drive: unlike[drive] for drive, column in efforts.items() if drive in unlike and (
+        isinstance(column, int) or (unit_of(column) is None and abs(
+            np.log(abs(unlike[drive]))) > np.log(SAME_MASSES)))}
     scales = ', '.join(f'{drive}: {{effort_scale: {1 / factor:.3g}}}'
                        for drive, factor in factors.items())
     listed = ', '.join(f'{factor:.3g} ({drive})' for drive, factor in factors.items())
@@ -460,10 +463,10 @@ def _is_short_for(first: str, other: str) -> bool:
 
 
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Mapping[str, str],
-             movable: Sequence[str], drives: Sequence[str], rate: float | None,
+             movable: Sequence[str], model: DriveModel, rate: float | None,
              ) -> tuple[dict[str, Any], list[str], set[str]]:
     """Return what `columns` hold, what was guessed, and which quantities there are."""
-    kinds = {*files}
+    kinds, drives = {*files}, model.drives
     found: dict[str, Any] = {}
     if files:
         guess = _guess_of_files(files, drives, rate, movable)
@@ -481,7 +484,8 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
             # Positions of joint states may have their efforts in arrays; else it is a table.
             if contents.joints and not contents.series:
                 raise
-        guess = guess_columns(contents.series, drives, others=movable, rate=rate)
+        guess = guess_columns(contents.series, drives, others=movable, rate=rate,
+                              model=model)
         kinds = {*(kind for _, kind in guess.columns), guess.effort_kind}
     if guess.time is not None:
         if guess.time not in TIME_COLUMNS:

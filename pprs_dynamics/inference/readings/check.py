@@ -37,12 +37,13 @@ from pprs_dynamics.inference.readings.findings import (
     find_other_velocities,
     findings_of,
     position_scales,
+    velocity_factors,
 )
 from pprs_dynamics.inference.readings.table import Reading, named, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Defect, Mask
+from pprs_dynamics.measurement.files.samples import Defect, Indices, Mask
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
@@ -63,6 +64,10 @@ class Fit:
         Mean residual and the largest of a drive, over the squared effort.
     prior : float
         Largest prior cost of a drive [nats].
+    least_left : float
+        Smallest residual of a drive.
+    is_rigid : bool
+        Whether each effort certainly has inertia or weight in it.
     """
 
     reading: Reading
@@ -70,6 +75,8 @@ class Fit:
     left: float = 1.0
     most_left: float = 1.0
     prior: float = 0.0
+    least_left: float = 1.0
+    is_rigid: bool = False
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -148,18 +155,30 @@ class Search:
     ----------
     model : DriveModel
     recording : Recording
+    efforts : (N, E) array, optional
+        Of all columns that may be efforts, in place of those of the recording.
     """
 
-    def __init__(self, model: DriveModel, recording: Recording) -> None:
+    def __init__(self, model: DriveModel, recording: Recording, efforts: Array | None = None,
+                 ) -> None:
         self.model = model
         times = _time_units(recording)
-        self.excerpts = {unit: excerpt for unit in (1.0, *times)
-                         if (excerpt := excerpt_of(recording, table.STRETCHES, unit)) is not None}
+        self.excerpts = {
+            unit: excerpt for unit in (1.0, *times) if (excerpt := excerpt_of(
+                recording, table.STRETCHES, unit, efforts)) is not None}
+        turning = [units.turns for units in model.units]
         self.rows = readings(model.drives, model.units, self._loads(), times,
-                             bool(np.all(recording.position % 1 == 0)))
+                             bool(np.all(recording.position[:, turning] % 1 == 0)))
+        # Amperes are more likely where no name says that it is an effort.
+        names = [] if model.recorded.columns is None else [
+            drive.names.get('effort') for drive in model.recorded.columns.drives.values()]
+        self.price_of_constants = table.COST['drive_constant'] - table.UNNAMED * (
+            efforts is not None or any(isinstance(name, int) for name in names))
         # Of currents without a known gain no force is known: masses and units say nothing.
         self.has_gain = model.effort_kind != CURRENT or model.knows_currents
         self.masses = table.MASSES if self.has_gain else np.inf
+        # Recorded velocities over the derivatives of positions.
+        self.factors = velocity_factors(self.excerpts[1.0]) if 1.0 in self.excerpts else {}
         self.start = Fit(self.rows[0])
         self.fits: list[Fit] = []
         self._evidence: dict[bytes, Evidence | None] = {}
@@ -200,21 +219,24 @@ class Search:
             upper - lower >= 2 * np.pi) & (np.linalg.norm(evidence.roots[:, 0, :, 1], axis=1) == 0)
         return np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
 
-    def likely(self) -> list[Fit]:
-        """Return the best reading where it is more likely than the plain one, and its rivals.
+    def best(self, efforts: Indices | None = None) -> Fit:
+        """Return the most likely reading; mistakes are added to it until none makes it likelier.
 
-        Mistakes are added to the best reading until none makes it more likely.
+        Parameters
+        ----------
+        efforts : (D,) int array, optional
+            Columns of the drives' efforts.
         """
-        first = self.rows[0]
+        first = self.rows[0] if efforts is None else replace(self.rows[0], efforts=efforts)
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
-        self.start = start = self.fit(first) or self.start
+        self.start = start = self.fit(first) or Fit(first)
         self.fits = [start]
         is_inside = 1.0 in self.excerpts and not self._outside(first, self.excerpts[1.0])
         # Without masses a gravity of any size may explain positions in another unit.
         explains = is_inside and start.reading.is_plain and self.has_gain and (
             start.prior < table.PLAUSIBLE)
         if explains and start.most_left < table.CLOSE_FIT:
-            return []
+            return start
         is_explained = explains and start.most_left < table.EXPLAINED
         seed = None
         while self._top() is not seed:
@@ -224,9 +246,17 @@ class Search:
                           and self._may_follow(row, seed.reading)
                           and (fit := self.fit(row.after(seed.reading))) is not None
                           and self._is_credible(row, fit)]
-        best = self._top()
+        return self._top()
+
+    def likely(self) -> list[Fit]:
+        """Return the best reading where it is more likely than the plain one, and its rivals."""
+        best = self.best()
         is_sure = not best.reading.is_plain and best.left <= table.GOOD_FIT and (
             self._is_certain(best))
+        # The inertia of a drive without weight may be invented, a unit of its efforts not.
+        evidence, scales = self.evidence(best.reading), best.reading.effort_scale
+        is_sure &= evidence is not None and (evidence.has_weight or bool(
+            np.all(np.isin(scales, table.SCALES))))
         return [best, *self._rivals(best)] if is_sure else []
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
@@ -283,12 +313,13 @@ class Search:
         # A mounting without weight explains none.
         if evidence is None or (reading.gravity is not None and not evidence.has_weight):
             return None
-        weights = self._weights(excerpt, evidence)[reading.efforts]
+        weights = self._weights(reading, excerpt, evidence)
         measured = [d for d in np.flatnonzero(weights > 0).tolist()
                     if evidence.is_measured(d, reading.efforts[d])]
         if not measured:
             return None
-        weight, cost = weights[measured], reading.cost + self._outside(reading, excerpt)
+        weight, cost = weights[measured], (
+            reading.cost + self._outside(reading, excerpt) + self._against_velocities(reading))
 
         @cache
         def likelihood(d: int, scale: float) -> Likelihood:
@@ -300,7 +331,8 @@ class Search:
             return Fit(replace(reading, effort_scale=scales, share=share), score - cost - price,
                        float(np.exp(np.average(np.log([each.left for each in found]),
                                                weights=weight))),
-                       max(each.left for each in found), max(each.prior for each in found))
+                       max(each.left for each in found), max(each.prior for each in found),
+                       min(each.left for each in found))
 
         def alone(d: int, scales: Sequence[float]) -> float:
             return max((likelihood(d, scale).score - _cost([scale]) / weights[d], scale)
@@ -342,12 +374,15 @@ class Search:
             Returns the likeliest of some scales of a drive.
         """
         same, every = np.log(table.SAME_MASSES), np.arange(len(factors))
-        units = table.SCALES if self.has_gain else (1.0, -1.0)
+        units = [scale for scale in table.SCALES if self.has_gain or abs(scale) == 1]
+        if not all(drive.turns for drive in self.model.units):
+            units = [scale for scale in units if abs(scale) != table.KGF_CM]
 
-        def is_near(scale: float, group: Sequence[int], distance: float = same) -> bool:
+        def is_near(scale: float, group: Sequence[int]) -> bool:
             off = np.abs(np.log(np.abs(factors[group] / scale)))
             off = off[np.isfinite(off)]
-            return abs(scale) == 1 or bool(len(off) and off.max() < distance)
+            return abs(scale) == 1 or bool(
+                len(off) and off.max() < np.log(table.OFF_IN_UNIT[abs(scale)]))
 
         scales = np.ones(len(factors))
         for d in measured:
@@ -358,29 +393,30 @@ class Search:
             _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds), ''
         # Inertia alone may be invented: units that are no prefixes need a weight.
         for scale in (scale for scale in units if has_weight or scale in table.OF_ONE):
-            if is_near(scale, measured, table.NEAR_UNIT if abs(scale) == table.KGF_CM else same):
+            if is_near(scale, measured):
                 yield np.where(recorded, scale, 1.0), _cost([scale]), ''
         known = [d for d in measured if np.isfinite(factors[d])]
         signs, sizes = np.sign(factors[known]), np.abs(factors[known])
-        if not (known and has_weight and self.has_gain) or np.ptp(signs) > 0:
+        if not (known and self.has_gain) or np.ptp(signs) > 0:
             return
         price, limits = _cost(signs[:1]), self.model.limits.efforts
-        if len(known) > 1 and np.all(np.isfinite(limits[known])):
+        if has_weight and len(known) > 1 and np.all(np.isfinite(limits[known])):
             for share, name in table.SHARES.items():
                 scales = signs[0] / (share * limits)
                 # Factors near 1 are errors of masses.
                 if np.any(np.abs(np.log(np.abs(scales[known]))) > same) and np.all(
                         np.abs(np.log(factors[known] / scales[known])) < same):
                     yield scales, price + table.COST['effort_unit'] + 1.0, name
-        # A load may multiply what one drive of several needs.
+        # A load may multiply what one drive of several needs; constants near a unit are that.
         if len(known) >= min(2, len(factors)) and np.all(
-                np.abs(np.log(sizes)) > same) and np.all(sizes > table.LARGEST_COMPLIANCE):
+                np.abs(np.log(sizes)) > same) and np.all(sizes > table.LARGEST_COMPLIANCE) and (
+                not any(is_near(scale, known) for scale in table.OF_ONE if abs(scale) != 1)):
             yield (np.where(np.isin(every, known), factors, 1.0),
-                   price + table.COST['drive_constant'], '')
+                   price + self.price_of_constants, '')
 
-    def _weights(self, excerpt: Excerpt, evidence: Evidence) -> Array:
+    def _weights(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> Array:
         """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
-        effort = np.sqrt(np.nanmean(np.nan_to_num(excerpt.effort) ** 2, axis=0))
+        effort = np.sqrt(np.mean(np.nan_to_num(excerpt.effort[:, reading.efforts]) ** 2, axis=0))
         moves = evidence.speed > self.model.reversal.velocity
         sizes = np.maximum(effort / max(effort.max(), 1e-300),
                            evidence.size / max(evidence.size.max(), 1e-300))
@@ -396,7 +432,8 @@ class Search:
         reading, evidence = fit.reading, self.evidence(fit.reading)
         if evidence is None or not np.any(reading.effort_scale < 0):
             return evidence is not None
-        weights, votes = self._weights(self.excerpts[reading.time_unit], evidence), 0.0
+        weights, votes = self._weights(
+            reading, self.excerpts[reading.time_unit], evidence), 0.0
         moves = evidence.speed > self.model.reversal.velocity
         for d in np.flatnonzero((reading.effort_scale < 0) & moves).tolist():
             column = int(reading.efforts[d])
@@ -417,7 +454,9 @@ class Search:
         position = np.where(turns, position - 2 * np.pi * np.round(
             (position - middle) / (2 * np.pi)), position)
         slack = np.where(np.isfinite(slack), slack, 0.0)
-        return not np.any((position < lower - slack) | (position > upper + slack))
+        # What one mistake does not concern may be the next one.
+        of_motion = sorted({k for part in reading.parts for k in part.drives}) or slice(None)
+        return not np.any(((position < lower - slack) | (position > upper + slack))[:, of_motion])
 
     def _outside(self, reading: Reading, excerpt: Excerpt) -> float:
         """Return the cost of positions and speeds that are beyond their limits."""
@@ -429,6 +468,17 @@ class Search:
         most = float(np.max(np.maximum(reach, speed)))
         return (table.FAR_OUTSIDE if most > table.FAR
                 else table.OUTSIDE if most > table.BEYOND else 0.0)
+
+    def _against_velocities(self, reading: Reading) -> float:
+        """Return the cost of units of positions that no unit of the recorded velocities suits."""
+        def is_one_of(units: Sequence[float], factor: float) -> bool:
+            return any(abs(abs(factor / unit) - 1) < table.RATE_OFF for unit in units)
+
+        # Velocities are in the unit of the positions, or in one of their own.
+        unlike = [d for d, factor in self.factors.items() if reading.scale[d] != 1 and not (
+            is_one_of((1.0,), factor) or is_one_of(
+                (1.0, *table.VELOCITY_UNITS), factor / float(reading.scale[d])))]
+        return table.UNLIKE_VELOCITY * bool(unlike)
 
     def far_outside(self, recording: Recording) -> Iterator[OtherReading]:
         """Yield positions far beyond the strokes, which no effort is needed to recognise."""

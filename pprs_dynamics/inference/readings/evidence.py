@@ -46,14 +46,14 @@ class Likelihood(NamedTuple):
 
 @dataclass
 class Evidence:
-    """Regression of the efforts of an excerpt on a model's forces, for D drives and columns.
+    """Regression of the efforts of an excerpt on a model's forces, for D drives and E columns.
 
     Parameters
     ----------
-    roots : (D, D, 7, 7) array
+    roots : (D, E, 7, 7) array
         By drive and column of efforts: triangle of the QR decomposition of inertia, gravity, other
         forces, velocity, its direction, 1 and the effort.
-    count, total, swing : (D, D) arrays
+    count, total, swing : (D, E) arrays
         Samples, sum of the squared efforts, and of their differences from the mean.
     size, speed : (D,) arrays
         Root mean squares of the model's forces, and of velocities.
@@ -103,7 +103,7 @@ class Evidence:
         columns = np.where(followed[:, :, None], columns, 0.0)
         known = np.isfinite(excerpt.effort)
         effort = np.where(known, excerpt.effort, 0.0)
-        gram = np.zeros((position.shape[1], position.shape[1], 7, 7))
+        gram = np.zeros((position.shape[1], effort.shape[1], 7, 7))
         gram[..., :6, :6] = np.einsum('ndij,ne->deij', columns[:, :, :, None]
                                       * columns[:, :, None, :], known, optimize=True)
         gram[..., 6, :6] = gram[..., :6, 6] = np.einsum('ndi,ne->dei', columns, effort)

@@ -157,7 +157,7 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
 
     All alike they contradict the unit or rate of times; else their own unit or sign is another.
     """
-    factors = {} if excerpt is None else _velocity_factors(excerpt)
+    factors = {} if excerpt is None else velocity_factors(excerpt)
     common = float(np.median([*factors.values()])) if factors else 0.0
     drives, columns, off = model.drives, model.recorded.columns, table.RATE_OFF
     if columns is not None and common > 0 and all(
@@ -193,7 +193,7 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
                 for k in group))
 
 
-def _velocity_factors(excerpt: Excerpt) -> dict[int, float]:
+def velocity_factors(excerpt: Excerpt) -> dict[int, float]:
     """Return recorded velocities over the derivatives of positions, of drives where they agree."""
     found: dict[int, float] = {}
     for drive, (recorded, true) in enumerate(() if excerpt.velocity is None else zip(

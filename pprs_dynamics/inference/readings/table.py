@@ -34,6 +34,9 @@ TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
+# Factors by which masses are off at most in such a unit: drive constants are near kgf cm, and the
+# compliance of a controller, times N/m, is near kN.
+OFF_IN_UNIT = {1e3: 3.0, 1e-3: 1.5, KGF_CM: 1.05}
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
 OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
@@ -65,6 +68,8 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
         'drive_constant': 10.0, 'load': 1.0}
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
+UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
+UNNAMED = 6.0  # less, of amperes in columns without names
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
@@ -81,7 +86,6 @@ WEAK = 0.01  # efforts and swings that are this much smaller than others tell no
 
 # ------------------------------------------------------------------------- scales of efforts
 
-NEAR_UNIT = 0.05  # relative distance from a unit's constant
 SAME_MASSES = 3.0  # factor by which masses of a description are off at most
 OTHER_UNIT = 1.5  # factor from which on the unit of efforts without a name is a question
 CERTAIN = 3.0  # standard errors
@@ -176,9 +180,8 @@ AS_WELL = 0.003  # difference of correlations that says nothing
 ROUGHER = 1.5  # third differences of what has noise, over those of what has none
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
-CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
 NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
-UNLIKE_EFFORT = 0.75  # share of a column that is explained: less beside one with more is none
+NO_EFFORT = 0.25  # residual of a column that is none, beside one with less
 LEAST_ROWS = 30
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
@@ -263,8 +266,10 @@ class Reading:
         """Return the reading that makes the mistakes of another one, and this one."""
         return replace(
             self, cost=first.cost + self.cost, scale=first.scale * self.scale,
+            positions=first.positions[self.positions], efforts=first.efforts[self.efforts],
             offset=first.offset * self.scale + self.offset, load=first.load + self.load,
-            time_unit=first.time_unit * self.time_unit, parts=(*first.parts, self),
+            time_unit=first.time_unit * self.time_unit,
+            parts=(*first.parts, *(self.parts or (self,))),
             gravity=first.gravity if self.gravity is None else self.gravity)
 
 
@@ -281,7 +286,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     times : sequence of float
         Units in which times may be [s].
     are_counts : bool
-        Whether all positions are whole numbers, as encoders count.
+        Whether all angles are whole numbers, as encoders count.
     """
     every = tuple(range(len(drives)))
     same, zero, ones = np.arange(len(drives)), np.zeros(len(drives)), np.ones(len(drives))
@@ -311,6 +316,12 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
                 if unit in COUNTS:
                     add('position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
                         few + 1, scale=scale, offset=-math.pi * np.isin(same, group))
+    # Angles in degrees beside lengths in millimetres: neither alone explains efforts.
+    alone = [row for row in rows if row.kind == 'position_unit']
+    rows += [second.after(first.after(rows[0])) for first, second in combinations(alone, 2)
+             if len(first.drives) + len(second.drives) == len(drives)
+             and {*first.drives}.isdisjoint(second.drives)
+             and units[first.drives[0]].turns != units[second.drives[0]].turns]
     for group in _groups(drives, every):
         add('position_sign', f'the {_position(drives, group)} negated', group, ALL_NEGATED * (
             len(group) == len(every) > 1), scale=np.where(np.isin(same, group), -1.0, 1.0))

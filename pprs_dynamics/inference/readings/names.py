@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the names of columns say: quantities, units, joints and who asked or measured."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from pprs_dynamics.drives import Column
+from pprs_dynamics.inference.readings import table
+from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
+from pprs_dynamics.measurement.files.samples import Series
+
+QUANTITIES = {word for words in table.WORDS.values() for word in words}
+KNOWN = QUANTITIES | table.OTHERS
+ROLE = '(ist|soll|act|cmd|meas|fbk|des|ref)'
+# Words that another may precede in one: Gelenkmoment, but not timestamp nor payload.
+LONG, LONGER = ('|'.join(sorted((word for word in QUANTITIES if len(word) >= least), reverse=True))
+                for least in (3, 5))
+COMPOUND = re.compile(f'(?:j|{ROLE})?({LONG}|d?qd?)(?:e?[ns])?(?:{ROLE}(?:wert)?)?'
+                      f'|([a-z]{{3,}})({LONGER})(?:e?[ns])?(?:{ROLE}(?:wert)?)?')
+
+
+def words_of(title: str) -> list[str]:
+    """Return the words and numbers of a name, in lower case; a unit as its quantity, `<effort>`."""
+    plain, unit = _without_unit(title)
+    return plain if unit is None else [*plain, f'<{unit[0]}>']
+
+
+def unit_of(title: str) -> tuple[str, float] | None:
+    """Return the quantity that the unit in a name is of, and its factor to SI; None for none."""
+    return _without_unit(title)[1]
+
+
+def _without_unit(title: str) -> tuple[list[str], tuple[str, float] | None]:
+    """Return the words of a name without its unit, and the unit."""
+    for bracket in re.finditer(r'[\[(]([^\])]*)[\])]', title):
+        if unit := _unit(re.sub(r'[ ._*·^-]', '', bracket[1].lower())):
+            return _words(title[:bracket.start()] + ' ' + title[bracket.end():]), unit
+    words = _words(title)
+    for length in (2, 1):
+        for at in range(len(words) - length, -1, -1):
+            some = words[at:at + length]
+            # Single letters are units in brackets alone.
+            if (len(some[0]) > 1 or not some[0].isalpha()) and (
+                    unit := _unit('/'.join(some)) or _unit(''.join(some))):
+                return words[:at] + words[at + length:], unit
+    return words, None
+
+
+def _unit(name: str) -> tuple[str, float] | None:
+    return next(((quantity, units[name]) for quantity, units in table.UNITS.items()
+                 if name in units), None)
+
+
+def _words(text: str) -> list[str]:
+    parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', text.replace('_', ' '))  # not in mA
+    found = re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower())
+    return [each for word in found for each in _split(word)]
+
+
+def _split(word: str) -> list[str]:
+    """Return the parts of a word that is several in one: posa, taum, Istposition, Gelenkwinkel.
+
+    The last letter of a quantity says actual or desired. A German or joined word ends in a
+    quantity, perhaps followed by ist or soll.
+    """
+    if word in KNOWN or not word.isalpha():
+        return [word]
+    if word[:-1] in QUANTITIES and (len(word) > 3 or word[0] in 'qd') and (
+            word[-1] in table.LETTERS):
+        return [word[:-1], table.LETTERS[word[-1]]]
+    compound = COMPOUND.fullmatch(word)
+    return [part for part in compound.groups() if part] if compound else [word]
+
+
+def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
+         ) -> tuple[float, ...]:
+    """Return how well a group of columns fits a quantity; not at all below 0."""
+    told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
+    for words in ({word for word in key if len(word) > 1}, {*key}):
+        # A single letter beside a word is a prefix of programmers.
+        told = told or {kind for kind, known in table.WORDS.items() if words & {*known}}
+    is_german = bool({*key} & {'ist', 'soll'})
+    if not told and is_german and 'm' in key:
+        told.add(EFFORT)
+    if not told and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
+        told.add(POSITION)  # "joint torque" is no position
+    if CURRENT in told and EFFORT in told:
+        told.discard(EFFORT)
+    # The name of the joint alone is a position, as in `shoulder_pan`.
+    plain = not told and not {*key} - {'*', 'observation'} - table.MEASURED
+    fits = given is not None or quantity in told or (quantity == POSITION and plain)
+    if quantity == POSITION and VELOCITY in told:
+        fits = False
+    if not fits or {*key} & table.OTHERS:
+        return (-1.0,)
+    return (float(len(members)), float(not {*key} & (table.COMMANDS | table.FROM_OUTSIDE)),
+            float(not {*key} & table.SECONDARY), float(bool({*key} & table.MEASURED)),
+            -float(len(key)))
+
+
+def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
+    """Return the joint whose name is among the words, where, and how long it is."""
+    best: tuple[str, int, int] | None = None
+    for joint in joints:
+        own = words_of(joint)
+        shorter = [word for word in own if word != 'joint'] or own
+        for name in (own, shorter):
+            if name == ['joint'] or all(word.isdigit() for word in name):
+                continue
+            for at in range(len(words) - len(name) + 1):
+                if list(words[at:at + len(name)]) == name and (
+                        best is None or len(name) > best[2]):
+                    best = (joint, at, len(name))
+    return best
+
+
+def numbered(series: Sequence[Series]) -> dict[tuple[str, ...], dict[int, Column]]:
+    """Return columns that differ in a number alone, by their other words; gaps end them."""
+    found: dict[tuple[str, ...], dict[int, Column]] = {}
+    for item in series:
+        words = words_of(item.title)
+        for at, word in enumerate(words):
+            if word.isdigit() and len(word) < 4:
+                key = (*words[:at], '*', *words[at + 1:])
+                found.setdefault(key, {}).setdefault(int(word), item.column)
+    return {key: numbers for key, numbers in found.items()
+            if len(numbers) > 1 and max(numbers) - min(numbers) == len(numbers) - 1}
+
+
+def scale_of(title: str, quantity: str) -> float | None:
+    unit = unit_of(title)
+    return unit[1] if unit and unit[1] != 1 and (
+        unit[0] == quantity or (unit[0] == table.SHARE and quantity == EFFORT)) else None
