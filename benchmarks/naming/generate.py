@@ -17,6 +17,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -140,8 +141,7 @@ def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
 def _write_model(robot: str, model: DriveModel, folder: Path) -> None:
     if robot == '3-PPRS':
         (folder / 'model.yaml').write_text(format_model(model.values))
-        robot = export_robot(model, 'mjcf')
-        (folder / 'model.xml').write_text(written(robot, 'mjcf'))
+        (folder / 'model.xml').write_text(written(export_robot(model, 'mjcf'), 'mjcf'))
         return
     source = model_of(robot)
     shutil.copy(source, folder / 'model.yaml')
@@ -154,16 +154,17 @@ def _truth(draw: Draw, effects: Sequence[dict[str, object]]) -> Truth:
 
 
 def _named(effect: dict[str, object], kind: str) -> Named:
-    name, drives = str(effect['name']), effect['drives']
+    name, drives = str(effect['name']), cast('Sequence[str] | None', effect['drives'])
     parameters = json.loads(json.dumps(effect['parameters']))
     flat: dict[str, tuple[float, float | None]] = {}
     if name in SAME_FORM and kind != 'form':
         for key, value in parameters.items():
             if isinstance(value, dict):
                 flat.update({f'{key}.{inner}': (float(v), None) for inner, v in value.items()})
-            else:
-                flat[key] = (float(value), None)
-    return Named(name, None if drives is None else tuple(drives), flat)  # type: ignore[arg-type]
+            else:  # one value is that of every drive
+                flat.update({f'{drive}.{key}' if drive else key: (float(value), None)
+                             for drive in drives or ('',)})
+    return Named(name, None if drives is None else tuple(drives), flat)
 
 
 def _of_platform(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
