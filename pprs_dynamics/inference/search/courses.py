@@ -88,12 +88,13 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
         offers = sorted(_offers(fits, _bases(fits, plain), [*constant, *alone], _courses(fits)),
                         key=lambda offer: -offer.gain)
         likely |= {offer.candidate.effect: offer.candidate for offer in _best_of_each(offers)}
-        # Its shape was that of an effect that is there all the time.
-        tried = sorted((fits.refined(fits.evaluate((*rest, offer.candidate)))
+        # Its shape was that of an effect that is there all the time. Times that are samples off
+        # cost more than a pattern of no catalogue, which needs none.
+        tried = sorted((fits.refined(_refined(fits, fits.evaluate((*rest, offer.candidate))))
                         for offer in _best_of_each(offers)
                         for rest in _rests(best, offer.candidate)), key=lambda found: found.total)
-        found = min(map(fits.pruned, tried[:PRUNED]), key=lambda fitted: fitted.cost, default=best)
-        found = fits.refined(_refined(fits, found))
+        found = min([*map(fits.pruned, tried[:PRUNED]), *tried], key=lambda fitted: fitted.cost,
+                    default=best)
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
         best = found
