@@ -35,7 +35,7 @@ from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 ONSETS, STRETCHES, STRETCH_LENGTHS = 50, 40, (1, 4)
 COURSE_HALVINGS = 8  # of the step between them, around the best
 COURSE_TRIALS = 6  # candidates of a scan that are fitted
-SLOW_TRIALS = 2  # of them where the noise of the fit may hold them
+SLOW_TRIALS = 1  # of them where the noise of the fit may hold them
 FIRST_TIMES = 5  # parts of the recordings, between which effects that are not reported are tested
 PRUNED = 6  # sets that are simplified
 MOST_COURSES = 3  # effects of one set that change within the recordings
@@ -107,18 +107,24 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
 
 def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:
     """Return drives on which something may begin, end or grow, or that show a pattern."""
+    def pays(offer: _Offer) -> bool:
+        assert offer.candidate.course is not None
+        return offer.gain > fits.prior_costs.of_course(offer.candidate.course)
+
     constant = [(reported, candidate) for candidate in reported.effects if _is_new(candidate)]
     begun = [*_offers(fits, [(reported, 0.0)], constant, _courses(fits)),
              *_offers(fits, _bases(fits, reported), alone, _few_courses(fits))]
     # What begins may be slow noise to the fit without it: the likeliest are fitted.
-    fast = replace(reported, fit=with_fast_noise(fits.regression, reported.fit))
-    likely = sorted(_offers(fits, [(fast, 0.0)], alone, _courses(fits)),
+    fast = [(replace(reported, fit=with_fast_noise(fits.regression, reported.fit)), 0.0)]
+    shown = [pair for pair in alone if any(map(pays, _offers(fits, fast, [pair],
+                                                             _few_courses(fits))))]
+    likely = sorted(filter(pays, _offers(fits, fast, shown, _courses(fits))),
                     key=lambda offer: -offer.gain)[:SLOW_TRIALS]
-    begun += [replace(offer, gain=np.inf) for offer in likely if _refined(fits, fits.evaluate(
-        (*reported.candidates, offer.candidate))).total < reported.total]
+    begun = [offer for offer in begun if pays(offer)] + [
+        offer for offer in likely if _refined(fits, fits.evaluate(
+            (*reported.candidates, offer.candidate))).total < reported.total]
     return {d for unknown in reported.unknowns for d in unknown.drives} | {
-        d for offer in begun if offer.candidate.course is not None
-        and offer.gain > fits.prior_costs.of_course(offer.candidate.course) for d in offer.drives}
+        d for offer in begun for d in offer.drives}
 
 
 def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
