@@ -47,7 +47,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     title_of,
 )
-from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import (
     added_effects,
@@ -110,10 +109,7 @@ class DriveModel:
             See `from_parameters`.
         """
         file = find_file(path)
-        parameters = read_parameters(file)
-        with source_of_errors(str(file)):
-            read_steps(parameters)  # a damaged ledger is named before anything adds to it
-        return cls.from_parameters(parameters, source=str(file))
+        return cls.from_parameters(read_parameters(file), source=str(file))
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> Self:
