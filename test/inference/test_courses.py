@@ -52,17 +52,6 @@ def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment() -> N
     assert np.nanstd(found.remaining) < 1.1 * 0.05 / np.sqrt(5)
 
 
-@pytest.mark.parametrize('since', [1.21, 3.6, 9.7])
-def test_an_offset_that_begins_is_no_slow_noise_and_no_pattern_of_time(since: float) -> None:
-    effort = FORCES.total.copy()
-    effort[since < TIME, 3] += 0.5  # [N]
-    found = diagnose(MODEL, [recorded(effort)])
-    assert found.verdict in ('effect', 'ambiguous')
-    effect, = found.effects
-    assert (effect.name, effect.drives) == ('effort_offset', ('lift_1',))
-    assert found.to_dict()['effects'][0]['since'] == pytest.approx(since, abs=0.02)
-
-
 @pytest.mark.slow
 def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
     recording = recorded(np.where((TIME > 4.0)[:, None], loaded(0.2), FORCES.total))

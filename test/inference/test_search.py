@@ -56,9 +56,9 @@ def names(found: CandidateSet) -> list[str]:
     {'homing_error': {drive: {'zero': 0.004} for drive in DRIVES[:2]}},
     {'time_delay': {drive: {'delay': 0.012} for drive in DRIVES}},
     {'base_tilt': {'x': 0.12, 'y': -0.08}},
-    {'time_delay': {drive: {'delay': 0.008} for drive in DRIVES},
-     'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}}],
-    ids=lambda effects: '+'.join(effects))
+    pytest.param({'time_delay': {drive: {'delay': 0.008} for drive in DRIVES},
+                  'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}},
+                 marks=pytest.mark.slow)], ids=lambda effects: '+'.join(effects))
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
     row = tabulate(MODEL, [recording], DECISIONS).best

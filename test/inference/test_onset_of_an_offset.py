@@ -1,0 +1,27 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""An offset that begins within a recording is dated, whenever it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel, Recording
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.physics.mechanism.paths import Excitation
+
+
+@pytest.mark.parametrize('since', [1.005, 7.995])
+def test_an_offset_that_begins_is_no_slow_noise_and_no_pattern_of_time(since: float) -> None:
+    model, time = DriveModel.load(), np.arange(1000) * 0.01
+    forces = model.drive_forces(Excitation(10.0, seed=4).motion(time))
+    effort = forces.total + 0.05 * np.random.default_rng(1).normal(size=forces.total.shape)
+    effort[since < time, 3] += 0.5  # [N]
+    found = diagnose(model, [Recording.from_arrays(
+        'changing', time, forces.mechanism.position, None, effort)])
+    assert found.verdict in ('effect', 'ambiguous')
+    effect, = found.effects
+    assert (effect.name, effect.drives) == ('effort_offset', ('lift_1',))
+    assert found.to_dict()['effects'][0]['since'] == pytest.approx(since, abs=0.02)
