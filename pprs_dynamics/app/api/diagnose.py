@@ -29,7 +29,13 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
-from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain, sentence
+from pprs_dynamics.inference.diagnosis.quantities import (
+    capitalised,
+    listed,
+    name_drives,
+    plain,
+    sentence,
+)
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     Sentences,
@@ -254,7 +260,7 @@ def diagnosis_page(
     page.heading('Result')
     page.text(words.headline, 'lead')
     for text in words.reference:
-        page.text(f'{text[:1].upper()}{text[1:]}.')
+        page.text(sentence(text))
     page.sources(diagnosis.model.source, recordings, validation)
     with page.columns():
         _errors(page, diagnosis, after)
@@ -343,7 +349,7 @@ def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     for finding, group in zip(words.unexplained, unexplained_groups(diagnosis), strict=True):
         pictures = [(figures.unknown_picture(diagnosis, statement), sentence(statement.text))
                     for statement in group]
-        with page.fold(finding.title[:1].upper() + finding.title[1:]):
+        with page.fold(capitalised(finding.title)):
             page.card(finding_lines(finding),
                       [(figure, text) for figure, text in pictures if figure is not None])
 

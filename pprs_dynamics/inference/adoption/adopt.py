@@ -29,7 +29,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest, EffectReques
 from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import change, listed, plain
+from pprs_dynamics.inference.diagnosis.quantities import capitalised, change, listed, plain
 from pprs_dynamics.inference.diagnosis.statements import in_words, read_in
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -118,7 +118,7 @@ def adopt(
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
-    reason = '. '.join(text[:1].upper() + text[1:] if number else text
+    reason = '. '.join(capitalised(text) if number else text
                        for number, text in enumerate(found.objections)) or found.reason
     remarks = (*found.remarks, WEAK) if is_sure and not validate else found.remarks
     return replace(found, adopted=is_sure or force, reason=reason, remarks=remarks)

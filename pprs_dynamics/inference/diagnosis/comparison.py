@@ -18,7 +18,13 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent, word_little
+from pprs_dynamics.inference.diagnosis.quantities import (
+    capitalised,
+    in_unit,
+    listed,
+    percent,
+    word_little,
+)
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -287,7 +293,7 @@ class Comparison:
                  f" ({percent(self.relative)} of the effort's variation)")
         little = f'{word_little(self.little)}; ' if self.little else ''
         error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
-        error = error[:1].upper() + error[1:]
+        error = capitalised(error)
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
         if self.relative < DECISIONS.negligible:
             return f'{error}, which is negligible.'

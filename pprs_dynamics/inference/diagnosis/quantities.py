@@ -161,6 +161,11 @@ def listed(names: Sequence[str], last: str = 'and') -> str:
     return f'{", ".join(names[:-1])} {last} {names[-1]}'
 
 
+def capitalised(text: str) -> str:
+    """Return a phrase with a capital."""
+    return text[:1].upper() + text[1:]
+
+
 def sentence(text: str) -> str:
     """Return a phrase with a capital and a full stop."""
-    return f'{text[:1].upper()}{text[1:]}.'
+    return f'{capitalised(text)}.'

@@ -77,7 +77,7 @@ def _split(word: str) -> list[str]:
 
 
 def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
-         ) -> tuple[float, ...]:
+                ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
     told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
     for words in ({word for word in key if len(word) > 1}, {*key}):
@@ -132,6 +132,7 @@ def numbered(series: Sequence[Series]) -> dict[tuple[str, ...], dict[int, Column
 
 
 def scale_of(title: str, quantity: str) -> float | None:
+    """Return the factor to SI of a quantity by the unit in a name; None for none and for 1."""
     unit = unit_of(title)
     return unit[1] if unit and unit[1] != 1 and (
         unit[0] == quantity or (unit[0] == table.SHARE and quantity == EFFORT)) else None

@@ -45,8 +45,9 @@ Alone = list[tuple[CandidateSet, EffectCandidate]]
 
 @dataclass(frozen=True)
 class _Offer:
-    """A candidate with a course, the least fall of the deviance with it, and its drives."""
+    """A candidate with a course, the least fall of a set's deviance with it, and its drives."""
 
+    base: CandidateSet
     gain: float
     candidate: EffectCandidate
     drives: frozenset[int]
@@ -112,13 +113,14 @@ def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> 
         return offer.gain > fits.prior_costs.of_course(offer.candidate.course)
 
     constant = [(reported, candidate) for candidate in reported.effects if _is_new(candidate)]
+    fast = replace(reported, fit=with_fast_noise(fits.regression, reported.fit))
+    first = [*_offers(fits, [*_bases(fits, reported), (fast, 0.0)], alone, _few_courses(fits))]
     begun = [*_offers(fits, [(reported, 0.0)], constant, _courses(fits)),
-             *_offers(fits, _bases(fits, reported), alone, _few_courses(fits))]
+             *(offer for offer in first if offer.base is not fast)]
     # What begins may be slow noise to the fit without it: the likeliest are fitted.
-    fast = [(replace(reported, fit=with_fast_noise(fits.regression, reported.fit)), 0.0)]
-    shown = [pair for pair in alone if any(map(pays, _offers(fits, fast, [pair],
-                                                             _few_courses(fits))))]
-    likely = sorted(filter(pays, _offers(fits, fast, shown, _courses(fits))),
+    shown = {offer.candidate.name for offer in first if offer.base is fast and pays(offer)}
+    likely = sorted(filter(pays, _offers(fits, [(fast, 0.0)], [
+        pair for pair in alone if pair[1].name in shown], _courses(fits))),
                     key=lambda offer: -offer.gain)[:SLOW_TRIALS]
     begun = [offer for offer in begun if pays(offer)] + [
         offer for offer in likely if _refined(fits, fits.evaluate(
@@ -220,8 +222,8 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
                 ranked = np.argsort(-gains)
                 for kind in dict.fromkeys(course.kind for course in labels):
                     at = next(k for k in ranked if labels[k].kind == kind)
-                    yield _Offer(float(gains[at]) - dearer, _with_course(candidate, labels[at]),
-                                 frozenset(rows))
+                    yield _Offer(base, float(gains[at]) - dearer,
+                                 _with_course(candidate, labels[at]), frozenset(rows))
 
 
 def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
