@@ -29,6 +29,7 @@ LIFT = 3  # its place among the drives, which rises as the platform does
 BEFORE, AFTER = 0.8, 2.0  # [s] of the stream around the stop
 # [s] after the node went on: that long ago the stream's first messages after it were sent.
 LOOKED_AT = 0.3
+QUIET = 0.02  # [s] without an answer, after which the node writes none
 SETPOINT_AGE = 0.1  # [s] beyond which a setpoint is called old
 
 
@@ -61,8 +62,11 @@ def stopped(stream: Stream, process: Any, seconds: float, rate: float, stamped: 
     due, is_stopped, sent = began, False, 0
     while (now := time.monotonic()) < continued_at + AFTER:
         if not is_stopped and stopped_at <= now < continued_at:
+            while stream.spin(QUIET):  # what it writes just now would be finished after the stop
+                pass
             process.send_signal(signal.SIGSTOP)
-            is_stopped = True
+            due = time.monotonic()
+            is_stopped, continued_at = True, due + seconds
         elif is_stopped and now >= continued_at:
             process.send_signal(signal.SIGCONT)
             is_stopped, continued_at = False, now

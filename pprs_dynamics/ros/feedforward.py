@@ -166,7 +166,7 @@ class FeedforwardNode(ManagedNode):
     # --- messages -------------------------------------------------------------------------------
 
     def _on_trajectory(self, reader: RequestReader, data: bytes, info: dict[str, Any]) -> None:
-        began = time.perf_counter()
+        began, worked = time.perf_counter(), time.process_time()
         passed_over = self._senders.passed_over(info)
         if self.state != 'active' or self._watchdog is None:
             return
@@ -177,6 +177,9 @@ class FeedforwardNode(ManagedNode):
             request = reader.read(data, now, node_values['missing_derivatives'])
             self._timing.check(request, now, _since(info['source_timestamp']))
             answer = self._feedforward.answer(request)
+            # All that the node did not compute it stood still: suspended, or without a processor.
+            self._timing.check_pause(
+                time.perf_counter() - began - (time.process_time() - worked))
         except PprsError as error:
             self._reject(Rejection.of(error))
             return

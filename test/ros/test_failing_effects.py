@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import time
 from types import ModuleType
 from typing import Any
 
@@ -59,6 +60,25 @@ def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: A
         assert 'the last pose is held at rest, without worn_brake' in status['message']
         assert node.bench.spin_until(lambda: len(node.commands) == 2)
         np.testing.assert_allclose(node.commands[-1].data, held(ONE), rtol=0, atol=EQUAL)
+
+
+@pytest.mark.nodes
+def test_a_pause_in_the_middle_of_a_computation_leaves_no_old_command(package: Any) -> None:
+    pause = 0.0
+
+    def columns(cls: type, drive: Any, **_: float) -> tuple[Any]:
+        time.sleep(pause)
+        return (drive.velocity,)
+
+    package.WornBrake.columns = classmethod(columns)
+    with feedforward_bench(**parameters('worn_brake'), max_age=0.1) as node:
+        node.answer(message_of(ONE))
+        pause, silent = 0.3, len(node.commands)
+        node.send(message_of(ONE))
+        assert 'the node stood still for' in node.wait_for_status(code='TIME')['message']
+        pause = 0.0
+        node.answer(message_of(ONE))
+        assert len(node.commands) == silent + 1
 
 
 @pytest.mark.nodes

@@ -205,6 +205,13 @@ class Timing(NamedTuple):
             raise Rejection('TIME', f'the first point is due {ahead:.3f} s from now, and would be '
                             f'executed at once; max_ahead allows {self.max_ahead:g} s')
 
+    def check_pause(self, pause: float) -> None:
+        """Refuse (TIME) what became too old while the node stood still for a pause [s]."""
+        if self.max_age and pause > self.max_age:
+            raise Rejection('TIME', f'the node stood still for {pause:.3f} s before it had the '
+                            f'forces, max_age allows {self.max_age:g} s; the machine is busy, or '
+                            'the process was suspended')
+
 
 class RequestReader:
     """Reads requests for the motion of one body, or of joints.
