@@ -71,9 +71,9 @@ def test_a_pause_in_the_middle_of_a_computation_leaves_no_old_command(package: A
         return (drive.velocity,)
 
     package.WornBrake.columns = classmethod(columns)
-    with feedforward_bench(**parameters('worn_brake'), max_age=0.1) as node:
+    with feedforward_bench(**parameters('worn_brake'), max_age=0.5) as node:
         node.answer(message_of(ONE))
-        pause, silent = 0.3, len(node.commands)
+        pause, silent = 1.0, len(node.commands)
         node.send(message_of(ONE))
         assert 'the node stood still for' in node.wait_for_status(code='TIME')['message']
         pause = 0.0
