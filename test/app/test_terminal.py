@@ -86,22 +86,22 @@ def test_a_reader_that_goes_away_does_not_take_the_files_with_it(folder: Path) -
     assert b'pipe' not in done.stderr
 
 
-@pytest.mark.parametrize('name', ['x[bold].csv', UNDECODABLE])
-def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: str) -> None:
-    (folder / 'x[').mkdir(exist_ok=True)
-    shown = name.replace(UNDECODABLE, 'bad\\xff[m].csv').replace('\n', '\\n')
-    shutil.copy(folder / 'run.csv', folder / name)
-    done = process(folder, 'info', name, '--json', 'name.json')
+@pytest.mark.parametrize('command', ['info', 'compare'])
+def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, command: str) -> None:
+    shutil.copy(folder / 'run.csv', folder / 'x[bold].csv')
+    page = ['--report', 'x[bold].html'] if command == 'compare' else []
+    done = pprs(command, 'x[bold].csv', *page, '--json', 'name.json', cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert f'{shown}: ' in done.stdout.decode()
+    assert ('page: x[bold].html' if page else 'x[bold].csv: ') in done.stdout
+
+
+def test_a_name_that_is_no_text_is_shown_and_written_with_its_bytes(folder: Path) -> None:
+    shutil.copy(folder / 'run.csv', folder / UNDECODABLE)
+    done = process(folder, 'info', UNDECODABLE, '--json', 'name.json')
+    assert done.returncode == 0, done.stderr
+    assert 'bad\\xff[m].csv: ' in done.stdout.decode()
     content = json.loads((folder / 'name.json').read_text(encoding='utf-8'))
-    assert content['recordings'][0]['name'] == shown
-    page = name.replace('.csv', '.html')
-    done = process(folder, 'compare', name, '--report', page, '--json',
-                   name.replace('.csv', '.json'))
-    assert done.returncode == 0, done.stderr
-    assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
-    (folder / page).read_text(encoding='utf-8')
+    assert content['recordings'][0]['name'] == 'bad\\xff[m].csv'
 
 
 def test_sentences_wrap_between_words_and_commands_stay_on_one_line() -> None:

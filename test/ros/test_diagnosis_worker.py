@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.mechanism.paths import Excitation
+from single_axis import axis, axis_recording
+
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
 
 SECOND = 1_000_000_000
@@ -53,12 +53,10 @@ def test_a_clock_that_is_set_back_begins_a_new_stream() -> None:
 
 
 def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
-    model = DriveModel.load()
-    motion = Excitation(15.0, seed=1).motion(np.arange(0, 15.0, 0.01))
-    forces = model.drive_forces(motion)
-    effort = forces.total + 0.05 * np.random.default_rng(0).standard_normal(forces.total.shape)
-    stamp = EPOCH + np.arange(len(effort), dtype=np.int64) * SECOND // 100
-    samples = StreamWindow(stamp, forces.mechanism.position, effort)
+    model = axis()
+    run = axis_recording(model)
+    stamp = EPOCH + np.rint(run.time * SECOND).astype(np.int64)
+    samples = StreamWindow(stamp, run.position, run.effort)
     worker = DiagnosisWorker()
     try:
         worker.submit(model.values, model.source, samples)

@@ -155,6 +155,8 @@ def the_one(recording: Recording, kind: str) -> Defect:
 def by_own_writer(suffix: str) -> Callable[[Path, Arrays], Path]:
     def write(folder: Path, arrays: Arrays) -> Path:
         path = folder / f'recording{suffix}'
-        write_recording(path, judged(arrays))
+        # Of columns, as others order their arrays.
+        write_recording(path, judged({name: None if values is None else np.asfortranarray(values)
+                                      for name, values in arrays.items()}))
         return path
     return write

@@ -17,7 +17,7 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 
-STEP = 0.002  # [s]
+STEP = 0.005  # [s]
 NOISE = 0.05  # [N], half of its variance white
 HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
           'effects.coulomb_friction.lift_2.force': 0.6, 'effects.payload_mass.mass': 0.15}
