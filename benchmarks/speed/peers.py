@@ -17,7 +17,6 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
-from oracles.mujoco_robot import trees
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
@@ -166,6 +165,43 @@ def pinocchio_trees(robot: ThreePprs) -> Any:
     return model
 
 
+def mujoco_trees(robot: ThreePprs) -> Any:
+    """Return the platform and three chains slide-lift-rod, for MuJoCo's compiler."""
+    geometry, masses = robot.geometry, robot.masses
+    spec, up = mujoco.MjSpec(), np.array([0.0, 0.0, 1.0])
+    spec.option.gravity = robot.gravity
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    xx, yy, zz, xy, xz, yz = masses.inertia
+    platform = spec.worldbody.add_body(
+        name='platform', mass=masses.platform + masses.payload, ipos=masses.centre,
+        fullinertia=(xx, yy, zz, xy, xz, yz), explicitinertial=True)
+    platform.add_freejoint()
+    for i, angle in enumerate(geometry.platform_angles):
+        point = geometry.platform_radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        platform.add_site(name=f'point_{i}', pos=point)
+    for i, angle in enumerate(geometry.chain_angles):
+        radial = np.array([np.cos(angle), np.sin(angle), 0.0])
+        tangential = np.array([-np.sin(angle), np.cos(angle), 0.0])
+        # Slides and lifts only translate: their inertia is needed by the compiler alone.
+        slide = spec.worldbody.add_body(
+            name=f'slide_{i}', pos=geometry.base_radius * radial, mass=masses.slides[i],
+            inertia=(1e-3, 1e-3, 1e-3), explicitinertial=True)
+        slide.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=tangential)
+        lift = slide.add_body(
+            name=f'lift_{i}', mass=masses.lifts[i], inertia=(1e-3, 1e-3, 1e-3),
+            explicitinertial=True)
+        lift.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=up)
+        length = geometry.rod_length
+        transverse = masses.rods[i] * length ** 2 / 12
+        # The rod never turns about its own axis: a thin rod's 0 there becomes any small number.
+        rod = lift.add_body(
+            name=f'rod_{i}', mass=masses.rods[i], ipos=length / 2 * up,
+            inertia=(transverse, transverse, 1e-3 * transverse), explicitinertial=True)
+        rod.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=tangential)
+        rod.add_site(name=f'tip_{i}', pos=length * up)
+    return spec
+
+
 class PinocchioPeer(Peer):
     """One `rnea` per sample; in batches one call for all."""
 
@@ -177,7 +213,7 @@ class PinocchioPeer(Peer):
         self.data = self.model.createData()
         self.pool = pin.ModelPool(self.model, 1) if hasattr(pin, 'ModelPool') else None
 
-    def trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
+    def mujoco_trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
         (v1, v2, v3), (w1, w2, w3), (a1, a2, a3), (e1, e2, e3) = v, omega, a, epsilon
         R11, R12, R13, R21, R22, R23, R31, R32, R33 = R
         # Spatial acceleration, and everything in the platform's frame.
@@ -236,7 +272,7 @@ class MujocoPeer(Peer):
 
     def __init__(self, robot: ThreePprs) -> None:
         super().__init__(robot)
-        spec = trees(robot)
+        spec = mujoco_trees(robot)
         # Nothing here but the bodies: no contacts, no limits, no sensors to look for.
         spec.option.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONTACT
                                      | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -245,7 +281,7 @@ class MujocoPeer(Peer):
         self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
         self.result = self.data.qfrc_inverse
 
-    def trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
+    def mujoco_trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
         (w1, w2, w3), (e1, e2, e3) = omega, epsilon
         R11, R12, R13, R21, R22, R23, R31, R32, R33 = R
         x, y, z, w = quaternion.tolist()

@@ -10,7 +10,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from workbench_bench import write_hidden
+from workbench_bench import AXIS, write_axis
 from workbench_server import workbench
 
 from pprs_dynamics.measurement.files.recording import read_recording, write_bag
@@ -20,19 +20,19 @@ from pprs_dynamics.measurement.files.recording import read_recording, write_bag
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('command')
     (folder / 'data').mkdir()
-    write_hidden(folder / 'data' / 'run.csv', 1)
+    write_axis(folder / 'data' / 'run.csv', 1)
     return folder
 
 
 def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> None:
     bags = folder / 'bags'
     bags.mkdir()
-    write_hidden(bags / 'plain.csv', 4)
+    write_axis(bags / 'plain.csv', 4)
     for seed, name in ((1, 'first.mcap'), (2, '../other.mcap')):
-        samples = read_recording(write_hidden(folder / 'spare.csv', seed))
+        samples = read_recording(write_axis(folder / 'spare.csv', seed))
         write_bag(bags / name, {'/left/joint_states': samples, '/right/joint_states': samples})
-    with workbench(bags, '--topic', '/right/joint_states', '--validate', folder / 'other.mcap',
-                   folder=folder) as bench:
+    with workbench('--model', AXIS, bags, '--topic', '/right/joint_states', '--validate',
+                   folder / 'other.mcap', folder=folder) as bench:
         bench.enter()
         bench.wait(lambda screen: not screen['is_beginning'])
         refused = bench.post('/api/open', name='0/first.mcap', is_held_out=True)
@@ -48,8 +48,8 @@ def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> N
 
 
 def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder: Path) -> None:
-    short = write_hidden(folder / 'short.csv', 1, 0.6)
-    with workbench(short, folder=folder) as bench:
+    short = write_axis(folder / 'short.csv', 1, 0.6)
+    with workbench('--model', AXIS, short, folder=folder) as bench:
         bench.enter()
         screen = bench.wait(lambda screen: not screen['is_beginning'])
         assert 'must hold at least 100 of a drive' in screen['failure']
@@ -57,7 +57,7 @@ def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder:
 
 
 def test_it_ends_at_once_and_in_a_line_while_a_browser_listens(folder: Path) -> None:
-    with workbench(folder / 'data', folder=folder) as bench:
+    with workbench('--model', AXIS, folder / 'data', folder=folder) as bench:
         bench.enter()
         bench.wait(lambda screen: not screen['is_beginning'])
         connection = http.client.HTTPConnection('127.0.0.1', bench.port, timeout=60)

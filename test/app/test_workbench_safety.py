@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from ros_processes import executable
-from workbench_bench import write_hidden
+from workbench_bench import AXIS, write_axis
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS, Offered
@@ -29,8 +29,8 @@ SECRET = 'no business of a browser'
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('safety')
     (folder / 'given').mkdir()
-    write_hidden(folder / 'run.csv', 1)
-    write_hidden(folder / 'given' / 'one.csv', 2)
+    write_axis(folder / 'run.csv', 1)
+    write_axis(folder / 'given' / 'one.csv', 2)
     (folder / 'secret.csv').write_text(SECRET)
     (folder / 'given' / 'link.csv').symlink_to(folder / 'secret.csv')
     return folder
@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def bench(folder: Path) -> Iterator[Workbench]:
-    with workbench(folder / 'run.csv', folder / 'given', folder=folder) as running:
+    with workbench('--model', AXIS, folder / 'run.csv', folder / 'given', folder=folder) as running:
         running.enter()
         running.wait(lambda screen: not screen['is_beginning'])
         yield running
@@ -70,7 +70,7 @@ def test_a_token_is_good_once_and_a_wrong_one_never(bench: Workbench, folder: Pa
 
 
 def test_the_cookie_is_for_this_page_alone(folder: Path) -> None:
-    with workbench(folder / 'run.csv', folder=folder) as other:
+    with workbench('--model', AXIS, folder / 'run.csv', folder=folder) as other:
         cookie = other.enter().headers['Set-Cookie'].lower()
         assert 'httponly' in cookie
         assert 'samesite=strict' in cookie
@@ -170,7 +170,7 @@ def test_uploads_are_bounded_and_read_by_the_strict_readers(bench: Workbench, fo
     for _ in range(MOST_UPLOADS):  # what failed does not count
         assert upload(bench, b'time,\n1,2\n') == 400
     assert len(bench.screen()['recordings']) == before
-    other = write_hidden(folder / 'other.csv', 3)
+    other = write_axis(folder / 'other.csv', 3)
     assert upload(bench, other.read_bytes(), '..%2f..%2fother.csv') == 200
     assert len(bench.screen()['recordings']) == before + 1
     assert not (folder.parent / 'other.csv').exists()

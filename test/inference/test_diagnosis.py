@@ -163,7 +163,7 @@ def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() ->
 
 def case(row: str, *effects: str, seed: int = 3, snr: float = 1.0, noise: float | str = 0.9,
          ) -> tuple[Diagnosis, dict]:
-    model, recording, truth = make_case(Case(row, effects, seed, snr, noise))
+    model, recording, truth = make_case(Case(row, effects, seed, snr, noise, duration=12.0))
     return diagnose(model, [recording]), truth
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from model_recordings import TIME, record, with_effects
+from model_recordings import record, with_effects
+from single_axis import AXIS, axis, axis_recording
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
@@ -27,22 +28,37 @@ from pprs_dynamics.physics.model.ledger import without_last_step
 from pprs_dynamics.physics.model.model_writer import write_model
 
 MODEL = DriveModel.load()
+AXIS_MODEL = axis()
 NOISE = 0.06  # [N]
 Effects = dict[str, dict[str, float]]
-STRIBECK: Effects = {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.02}}
+STRIBECK: Effects = {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0.02}}
 
 
 # What the model has, and what is true: of another size, of another shape, or not there at all.
 WRONG: dict[str, tuple[Effects, Effects]] = {
     'a payload that is not there': ({'payload_mass': {'mass': 0.3}}, {}),
     'another Stribeck velocity': (
-        {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.05}},
-        {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.01}}),
+        {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0.05}},
+        {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0.01}}),
     'another delay on one of two drives': (
         {'time_delay': {'slide_1.delay': 0.004, 'lift_1.delay': 0.004}},
         {'time_delay': {'slide_1.delay': 0.012, 'lift_1.delay': 0.004}}),
     'a zero that is not off': ({'homing_error': {'slide_1.zero': 0.004}}, {}),
 }
+
+
+def given_and_recorded(there: Effects, true: Effects, seed: int = 0,
+                       ) -> tuple[DriveModel, Recording]:
+    """Return a model with effects, and a recording of a robot of other effects.
+
+    It is the single axis where the parameters are of its drive, else the paper's robot.
+    """
+    keys = {key for block in (there | true).values() for key in block}
+    if any(key.startswith(f'{AXIS}.') for key in keys):
+        run = axis_recording(with_effects(AXIS_MODEL, true), seed, NOISE)
+        return with_effects(AXIS_MODEL, there), run
+    return with_effects(MODEL, there), record(with_effects(MODEL, true), NOISE, seed,
+                                              Excitation(seed=seed).motion)
 
 
 def booked(adoption: object, recording: Recording) -> DriveModel:
@@ -55,7 +71,8 @@ def booked(adoption: object, recording: Recording) -> DriveModel:
 def test_an_effect_that_does_not_hold_is_a_finding_with_both_values(case: str) -> None:
     there, true = WRONG[case]
     (name, given), = there.items()
-    found = diagnose(with_effects(MODEL, there), [record(with_effects(MODEL, true), NOISE)])
+    model, recording = given_and_recorded(there, true)
+    found = diagnose(model, [recording])
     assert found.verdict in ('effect', 'ambiguous')
     (effect,) = found.effects
     assert effect.name == name
@@ -77,11 +94,11 @@ def test_an_effect_that_does_not_hold_is_a_finding_with_both_values(case: str) -
     assert 'is in the model with' in headline
     assert 'lacks' not in headline or found.indistinguishable
     # What is handed on explains the recording to the noise.
-    assert rms(measure_residuals(found.adopted, [record(with_effects(MODEL, true), NOISE)])[0]) < (
-        1.03 * found.noise_floor)
+    assert rms(measure_residuals(found.adopted, [recording])[0]) < 1.03 * found.noise_floor
 
 
-RIGHT: Effects = {**STRIBECK, 'payload_mass': {'mass': 0.25},
+RIGHT: Effects = {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.02},
+                  'payload_mass': {'mass': 0.25},
                   'time_delay': {'slide_1.delay': 0.004}, 'base_tilt': {'x': 0.02, 'y': -0.01},
                   'effort_gain': {'lift_2.gain': 0.03}}
 
@@ -93,29 +110,26 @@ def test_effects_that_hold_are_adequate_as_they_are() -> None:
 
 
 def test_what_lies_within_its_uncertainty_is_no_finding_and_beyond_it_is_one() -> None:
-    """The same difference, of what is known to 0.04 kg, to 1 g, and of what is taken as exact."""
-    there, true = {'payload_mass': {'mass': 0.25}}, {'payload_mass': {'mass': 0.30}}
-    recording = record(with_effects(MODEL, true), NOISE)
+    """The same difference, of what is known to 0.3 N, to 1 mN, and of what is taken as exact."""
+    there, true = ({'coulomb_friction': {'axis.force': force}} for force in (1.0, 1.4))
+    _, recording = given_and_recorded(there, true)
 
     def verdict(std: float | None) -> str:
-        known = {} if std is None else {'payload_mass': {'mass': std}}
-        return diagnose(with_effects(MODEL, there, known), [recording]).verdict
-    assert verdict(0.04) == 'adequate'
+        known = {} if std is None else {'coulomb_friction': {'axis.force': std}}
+        return diagnose(with_effects(AXIS_MODEL, there, known), [recording]).verdict
+    assert verdict(0.3) == 'adequate'
     assert verdict(0.001) == 'effect'
     assert verdict(None) == 'effect'
 
 
 @pytest.mark.parametrize('true', [
-    {'payload_mass': {'mass': 0.3}}, pytest.param(STRIBECK, marks=pytest.mark.slow),
-    pytest.param({'time_delay': {'lift_1.delay': 0.006}}, marks=pytest.mark.slow)], ids=list)
+    {'payload_mass': {'mass': 0.3}}, STRIBECK, {'time_delay': {'axis.delay': 0.006}}], ids=list)
 def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     true: Effects, tmp_path: Path,
 ) -> None:
     (name, truth), = true.items()
-    # A delay is known to noise / (sqrt(samples) rms(dF/dt)), 1.3 ms in 8 s at 200 Hz.
-    time = np.arange(0, 16.0, 0.001) if name == 'time_delay' else TIME
-    first = record(with_effects(MODEL, true), NOISE, time=time)
-    adoption = adopt(MODEL, EffectRequest(CATALOGUE[name]), [first])
+    given, first = given_and_recorded({}, true)
+    adoption = adopt(given, EffectRequest(CATALOGUE[name]), [first])
     assert adoption.adopted
     model = booked(adoption, first)
     # The file says how well the effect is known.
@@ -124,20 +138,17 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     read = DriveModel.load(path)
     for key in truth:
         assert 0 < read.values[f'uncertainties.{name}.{key}'] < 0.1 * truth[key]
-    other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3).motion,
-                   time=time)
-    for recording in (first, other):
+    for recording in (first, given_and_recorded({}, true, 1)[1]):
         found = diagnose(read, [recording])
         assert (found.verdict, [effect.name for effect in found.effects]) == ('adequate', [])
 
 
 def test_adopt_sets_what_is_otherwise_and_the_way_back_is_exact() -> None:
-    there, true = WRONG['another Stribeck velocity']
-    given, recording = with_effects(MODEL, there), record(with_effects(MODEL, true), NOISE)
+    given, recording = given_and_recorded(*WRONG['another Stribeck velocity'])
     adoption = adopt(given, EffectRequest(CATALOGUE['stribeck_friction']), [recording])
     assert adoption.adopted
     after = booked(adoption, recording)
-    assert after.values['effects.stribeck_friction.lift_1.velocity'] == pytest.approx(0.01, rel=0.1)
+    assert after.values['effects.stribeck_friction.axis.velocity'] == pytest.approx(0.01, rel=0.1)
     assert diagnose(after, [recording]).verdict == 'adequate'
     assert without_last_step(after.values)[0] == given.values
 
@@ -147,7 +158,7 @@ def test_adopt_takes_out_what_nothing_is_left_of() -> None:
     there: Effects = {'coulomb_friction': {'slide_2.force': 0.4, 'lift_1.force': 0.3},
                       'payload_mass': {'mass': 0.3}}
     true: Effects = {'coulomb_friction': {'lift_1.force': 0.3}, 'payload_mass': {'mass': 0.3}}
-    given, recording = with_effects(MODEL, there), record(with_effects(MODEL, true), NOISE)
+    given, recording = given_and_recorded(there, true)
     adoption = adopt(given, EffectRequest(CATALOGUE['coulomb_friction'], ('slide_2',)), [recording])
     assert adoption.adopted
     assert any('removed from the model' in remark for remark in adoption.remarks)
@@ -156,7 +167,7 @@ def test_adopt_takes_out_what_nothing_is_left_of() -> None:
     assert less.values['effects.coulomb_friction.lift_1.force'] == pytest.approx(0.3, abs=0.02)
     assert less.values['effects.active'] == ['coulomb_friction', 'payload_mass']
     assert without_last_step(less.values)[0] == given.values
-    recording = record(with_effects(MODEL, {'payload_mass': {'mass': 0.3}}), NOISE)
+    _, recording = given_and_recorded({}, {'payload_mass': {'mass': 0.3}})
     adoption = adopt(less, EffectRequest(CATALOGUE['coulomb_friction']), [recording])
     assert adoption.adopted
     none = booked(adoption, recording)

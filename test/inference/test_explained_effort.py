@@ -25,7 +25,7 @@ UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
 def unrelated(model: DriveModel, seed: int = 5) -> Recording:
     """Return a recording whose first effort follows nothing that the drives do."""
-    made = record(model, motion())
+    made = record(model, motion(10.0))
     rng = np.random.default_rng(seed)
     knots = rng.normal(size=len(made.time) // 40 + 2) * UNRELATED
     effort = made.effort.copy()
@@ -64,7 +64,7 @@ def test_diagnose_calls_no_model_adequate_that_explains_little(tmp_path: Path) -
 def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -> None:
     real = real_arm(tmp_path)
     bare = DriveModel.load(write_arm(tmp_path))
-    made = record(real, motion())
+    made = record(real, motion(10.0))
     before = compare(bare, made)
     assert before.comparison.little
     assert 'no friction yet' in str(before)
@@ -92,7 +92,7 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     tmp_path: Path, size: float,
 ) -> None:
     model = real_arm(tmp_path)
-    residuals, _ = measure_residuals(model, [record(model, motion())])
+    residuals, _ = measure_residuals(model, [record(model, motion(10.0))])
     rng = np.random.default_rng(2)
     noise = size * rng.normal(size=len(residuals))
     quiet = replace(residuals, measured=residuals.measured.copy(), model=residuals.model.copy())
@@ -111,7 +111,7 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
 
 def test_noise_that_is_slow_is_for_no_model_to_explain(tmp_path: Path) -> None:
     model = real_arm(tmp_path)
-    residuals, _ = measure_residuals(model, [record(model, motion())])
+    residuals, _ = measure_residuals(model, [record(model, motion(10.0))])
     size = 1.5 * float(np.nanstd(residuals.model[:, 0]))
     white = np.random.default_rng(4).normal(size=len(residuals) + 500)
     slow = size * lfilter([0.1 ** 0.5], [1.0, -0.95], white)[500:]

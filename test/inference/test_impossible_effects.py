@@ -152,7 +152,7 @@ def test_a_gain_that_a_drive_may_have_is_one() -> None:
 def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path) -> None:
     """Radians that are called degrees: next to no motion, which linear forces are far from."""
     real = arm.real_arm(tmp_path)
-    run = arm.record(real, arm.motion(12.0, seed=0), 0.2, 0)
+    run = arm.record(real, arm.motion(8.0, seed=0), 0.2, 0)
     radians = np.array([np.pi / 180, np.pi / 180, 1.0])
     found = diagnose(DriveModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
         'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from model_recordings import TIME, record, with_effects
 from single_axis import Effects, axis, axis_recording
 
 from pprs_dynamics import DriveModel
@@ -24,28 +25,11 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.mechanism.paths import Excitation
 
 MODEL = DriveModel.load()
-TIME = np.arange(0, 12.0, 0.004)
-
-
-def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -> Recording:
-    """Return a recording of the paper's robot with effects, {name: {drive or key: ...}}."""
-    values = {}
-    for name, block in effects.items():
-        for key, value in block.items():
-            if isinstance(value, dict):
-                values |= {f'effects.{name}.{key}.{p}': v for p, v in value.items()}
-            else:
-                values[f'effects.{name}.{key}'] = value
-    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': list(effects), **values})
-    forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
-    said = model.measured(forces)
-    rng = np.random.default_rng(seed)
-    return Recording.from_arrays('made', TIME, forces.mechanism.position
-                                 + model.position_error(forces.mechanism.position),
-                                 effort=said.total + noise * rng.normal(size=said.total.shape))
+def recording_of(effects: dict[str, dict[str, float]], noise: float = 0.08) -> Recording:
+    """Return a recording of the paper's robot with effects."""
+    return record(with_effects(MODEL, effects), noise)
 
 
 def names(found: CandidateSet) -> list[str]:
@@ -53,11 +37,11 @@ def names(found: CandidateSet) -> list[str]:
 
 
 @pytest.mark.parametrize('effects', [
-    {'homing_error': {drive: {'zero': 0.004} for drive in DRIVES[:2]}},
-    {'time_delay': {drive: {'delay': 0.012} for drive in DRIVES}},
+    {'homing_error': {f'{drive}.zero': 0.004 for drive in DRIVES[:2]}},
+    {'time_delay': {f'{drive}.delay': 0.012 for drive in DRIVES}},
     {'base_tilt': {'x': 0.12, 'y': -0.08}},
-    pytest.param({'time_delay': {drive: {'delay': 0.008} for drive in DRIVES},
-                  'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}},
+    pytest.param({'time_delay': {f'{drive}.delay': 0.008 for drive in DRIVES},
+                  'stribeck_friction': {'lift_1.force': 1.0, 'lift_1.velocity': 0.02}},
                  marks=pytest.mark.slow)], ids=lambda effects: '+'.join(effects))
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
@@ -70,8 +54,8 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
 
 
 def test_two_effects_on_two_drives_are_not_one_flexible_effect_on_both() -> None:
-    recording = recording_of({'coulomb_friction': {'slide_1': {'force': 0.6}},
-                              'quadratic_friction': {'slide_2': {'coefficient': 20.0}}})
+    recording = recording_of({'coulomb_friction': {'slide_1.force': 0.6},
+                              'quadratic_friction': {'slide_2.coefficient': 20.0}})
     found = tabulate(MODEL, [recording], DECISIONS).best.effects
     assert {effect.name: effect.drives for effect in found} == {
         'coulomb_friction': (0,), 'quadratic_friction': (1,)}
@@ -101,7 +85,7 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
 
 
 def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
-    hidden = {drive: {'zero': 0.004} for drive in DRIVES[:2]}
+    hidden = {f'{drive}.zero': 0.004 for drive in DRIVES[:2]}
     fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
     zeros = [Component.of(CATALOGUE['homing_error'], d, {}, CATALOGUE['homing_error'].variants[0])
              for d in range(3)]

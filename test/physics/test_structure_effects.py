@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from oracles.mujoco_robot import MujocoRobot
 from random_states import ELBOWS, model_of, paper_model, random_motion, random_poses, random_robot
+from scipy.spatial.transform import Rotation
 
+from benchmarks.speed.peers import PinocchioPeer
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -54,40 +54,22 @@ def case(request):
     return robot, motion, model_of(robot).mechanism(motion)
 
 
-# The engine's robot with the change made in the engine ---------------------------------------
+# A robot that has the change in its own numbers, in Pinocchio ---------------------------------
 
-def heavier(engine, body, factor) -> None:
-    engine.model.body_mass[body] *= factor
-    engine.model.body_inertia[body] *= factor
-
-
-def changed_engine(name, robot):
-    """Return a MuJoCo robot with the effect made in its own terms."""
-    values = VALUES[name]
-    if name == 'platform_inertia':
-        # The engine keeps principal axes: it has to compile the tensor itself.
-        more = [values[axes] for axes in ('xx', 'yy', 'zz', 'xy', 'xz', 'yz')]
-        inertia = tuple(np.add(robot.masses.inertia, more))
-        return MujocoRobot(replace(robot, masses=replace(robot.masses, inertia=inertia)))
-    engine = MujocoRobot(robot)
-    platform = engine.bodies['platform']
-    if name == 'payload_mass':
-        engine.model.body_mass[platform] += values['mass']
-    elif name == 'payload_offset':
-        engine.model.body_ipos[platform] += [values[axis] for axis in 'xyz']
-    elif name == 'link_mass':
-        for i, mass in enumerate(robot.masses.rods):
-            heavier(engine, engine.bodies[f'rod_{i}'], 1 + values['rods.mass'] / mass)
-    elif name == 'base_tilt':
-        # A quaternion about x, then one about y.
-        about_x, about_y, both, g = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(3)
-        mujoco.mju_axisAngle2Quat(about_x, np.array([1.0, 0, 0]), values['x'])
-        mujoco.mju_axisAngle2Quat(about_y, np.array([0, 1.0, 0]), values['y'])
-        mujoco.mju_mulQuat(both, about_y, about_x)
-        mujoco.mju_rotVecQuat(g, np.array(robot.gravity), both)
-        engine.model.opt.gravity[:] = g
-    mujoco.mj_setConst(engine.model, engine.data)
-    return engine
+def changed_robot(name, robot):
+    """Return a robot whose bodies or gravity differ by an effect."""
+    values, masses = VALUES[name], robot.masses
+    if name == 'base_tilt':
+        tilt = Rotation.from_euler('xy', [values['x'], values['y']])
+        return replace(robot, gravity=tuple(tilt.apply(robot.gravity)))
+    moved = np.add(masses.centre, [VALUES['payload_offset'][axis] for axis in 'xyz'])
+    more = [VALUES['platform_inertia'][axes] for axes in ('xx', 'yy', 'zz', 'xy', 'xz', 'yz')]
+    changes = {
+        'payload_mass': {'payload': masses.payload + VALUES['payload_mass']['mass']},
+        'payload_offset': {'centre': tuple(moved)},
+        'link_mass': {'rods': tuple(np.add(masses.rods, VALUES['link_mass']['rods.mass']))},
+        'platform_inertia': {'inertia': tuple(np.add(masses.inertia, more))}}
+    return replace(robot, masses=replace(masses, **changes[name]))
 
 
 @pytest.mark.parametrize('name', [
@@ -95,8 +77,8 @@ def changed_engine(name, robot):
 def test_changed_bodies_give_the_engines_forces(case, name) -> None:
     robot, motion, state = case
     found = EFFECTS[name](VALUES[name]).force(state)
-    expected = changed_engine(name, robot).solve(motion).force - MujocoRobot(robot).solve(
-        motion).force
+    expected = PinocchioPeer(changed_robot(name, robot)).many(motion) - PinocchioPeer(
+        robot).many(motion)
     assert np.abs(expected).max() > 0.1
     assert_allclose(found, expected, rtol=0, atol=FORCE_TOLERANCE)
 

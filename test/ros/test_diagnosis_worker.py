@@ -12,7 +12,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-
 from single_axis import axis, axis_recording
 
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from model_recordings import with_effects
 from scipy.signal import lfilter
+from single_axis import axis_recording
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
@@ -21,6 +23,15 @@ STEP = 0.005  # [s]
 NOISE = 0.05  # [N], half of its variance white
 HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
           'effects.coulomb_friction.lift_2.force': 0.6, 'effects.payload_mass.mass': 0.15}
+
+AXIS = Path(__file__).parents[2] / 'config' / 'single_axis.yaml'
+
+
+def write_axis(path: Path, seed: int, duration: float = 8.0) -> Path:
+    """Write a recording of the single axis with friction that its model lacks."""
+    robot = with_effects(DriveModel.load(AXIS), {'coulomb_friction': {'axis.force': 6.0}})
+    write_recording(path, axis_recording(robot, seed, 1.0, time=np.arange(0.0, duration, STEP)))
+    return path
 
 
 def write_hidden(path: Path, seed: int, duration: float = 8.0,
