@@ -29,7 +29,7 @@ def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> N
     bags.mkdir()
     write_axis(bags / 'plain.csv', 4)
     for seed, name in ((1, 'first.mcap'), (2, '../other.mcap')):
-        samples = read_recording(write_axis(folder / 'spare.csv', seed))
+        samples = read_recording(write_axis(folder / 'spare.csv', seed), ('axis',))
         write_bag(bags / name, {'/left/joint_states': samples, '/right/joint_states': samples})
     with workbench('--model', AXIS, bags, '--topic', '/right/joint_states', '--validate',
                    folder / 'other.mcap', folder=folder) as bench:

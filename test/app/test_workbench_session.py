@@ -124,7 +124,8 @@ def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session)
     session.ticks.tick('payload_mass')
     session.ticks.settle()
     of_lift_2 = session.shares(2.0, 6.0, ['lift_2'])
-    assert of_lift_2[0].effect in ('coulomb_friction', 'asymmetric_friction', 'load_friction')
+    assert of_lift_2[0].effect in (
+        'coulomb_friction', 'asymmetric_friction', 'load_friction', 'gear_efficiency')
     assert of_lift_2[0].net > 0.8
     assert all(gain.net <= max(gain.explained, 0.0) + 1e-12 for gain in of_lift_2)
     session.ticks.tick('coulomb_friction', ['lift_2'])
@@ -169,7 +170,7 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
 
 
 def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
-    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 6.0) for seed in (1, 2))
+    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 10.0) for seed in (1, 2))
     session = Session.open([recording], validation=[other])
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)

@@ -38,8 +38,8 @@ STRIBECK: Effects = {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0
 WRONG: dict[str, tuple[Effects, Effects]] = {
     'a payload that is not there': ({'payload_mass': {'mass': 0.3}}, {}),
     'another Stribeck velocity': (
-        {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0.05}},
-        {'stribeck_friction': {'axis.force': 1.2, 'axis.velocity': 0.01}}),
+        {'stribeck_friction': {'axis.force': 3.0, 'axis.velocity': 0.05}},
+        {'stribeck_friction': {'axis.force': 3.0, 'axis.velocity': 0.02}}),
     'another delay on one of two drives': (
         {'time_delay': {'slide_1.delay': 0.004, 'lift_1.delay': 0.004}},
         {'time_delay': {'slide_1.delay': 0.012, 'lift_1.delay': 0.004}}),
@@ -148,7 +148,7 @@ def test_adopt_sets_what_is_otherwise_and_the_way_back_is_exact() -> None:
     adoption = adopt(given, EffectRequest(CATALOGUE['stribeck_friction']), [recording])
     assert adoption.adopted
     after = booked(adoption, recording)
-    assert after.values['effects.stribeck_friction.axis.velocity'] == pytest.approx(0.01, rel=0.1)
+    assert after.values['effects.stribeck_friction.axis.velocity'] == pytest.approx(0.02, rel=0.1)
     assert diagnose(after, [recording]).verdict == 'adequate'
     assert without_last_step(after.values)[0] == given.values
 

@@ -111,7 +111,7 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
 
 def test_noise_that_is_slow_is_for_no_model_to_explain(tmp_path: Path) -> None:
     model = real_arm(tmp_path)
-    residuals, _ = measure_residuals(model, [record(model, motion(10.0))])
+    residuals, _ = measure_residuals(model, [record(model, motion())])
     size = 1.5 * float(np.nanstd(residuals.model[:, 0]))
     white = np.random.default_rng(4).normal(size=len(residuals) + 500)
     slow = size * lfilter([0.1 ** 0.5], [1.0, -0.95], white)[500:]

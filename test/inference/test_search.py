@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from model_recordings import TIME, record, with_effects
+from model_recordings import record, with_effects
 from single_axis import Effects, axis, axis_recording
 
 from pprs_dynamics import DriveModel
@@ -27,9 +27,10 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 MODEL = DriveModel.load()
+TIME = np.arange(0, 12.0, 0.005)
 def recording_of(effects: dict[str, dict[str, float]], noise: float = 0.08) -> Recording:
     """Return a recording of the paper's robot with effects."""
-    return record(with_effects(MODEL, effects), noise)
+    return record(with_effects(MODEL, effects), noise, time=TIME)
 
 
 def names(found: CandidateSet) -> list[str]:

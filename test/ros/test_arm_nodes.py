@@ -152,7 +152,7 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
             publisher.publish(joints_message(moved[k:k + 1].with_time([0.0])))
         assert running.spin_until(lambda: len(commands) == len(moved)), running.status[-1]
         process.send_signal(signal.SIGTERM)
-        assert process.wait(10) == 0
+        assert process.wait(60) == 0
     np.testing.assert_allclose([sent.data for sent in commands], model.drive_forces(moved).total,
                                rtol=0, atol=EQUAL)
 

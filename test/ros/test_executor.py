@@ -21,7 +21,7 @@ from pprs_dynamics.ros.node.executor import PromptExecutor
 
 pytestmark = pytest.mark.nodes
 
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]
 
 
 @pytest.fixture(params=['known', 'changed'])

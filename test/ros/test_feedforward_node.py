@@ -119,10 +119,10 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
     running, good = feedforward.bench, message_of(random_motion(np.random.default_rng(3), 2))
     answer = feedforward.answer(good)
     for code, fields in DAMAGES:
-        counters, silent = dict(feedforward.node._counters), len(feedforward.commands)
+        counters, silent = feedforward.counters, len(feedforward.commands)
         feedforward.send(damaged(good, fields))
         expected = {**counters, 'received': counters['received'] + 1, code: counters[code] + 1}
-        assert feedforward.node._counters == expected, fields
+        assert feedforward.counters == expected, fields
         assert running.spin_until(lambda code=code: running.status[-1]['code'] == code)
         assert running.status[-1]['counters'][code] >= 1
         assert running.status[-1]['level'] == 'ERROR'

@@ -138,7 +138,7 @@ def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
                '-p', 'qos_overrides./effort/commands.publisher.reliability:=best_effort']
     with bench() as running, node_process(command, ros_domain, log):
         running.listen(Float64MultiArray, '/effort/commands')  # reliable
-        assert running.spin_until(lambda: 'RELIABILITY' in log.read_text(), 20), log.read_text()
+        assert running.spin_until(lambda: 'RELIABILITY' in log.read_text()), log.read_text()
     assert "'/effort/commands', requesting incompatible QoS" in log.read_text()
 
 

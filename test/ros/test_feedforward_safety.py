@@ -143,7 +143,7 @@ def test_nothing_goes_stale_before_the_first_command_nor_with_a_timeout_of_0() -
 
 def test_the_stale_timer_counts_from_the_trajectorys_end_and_a_shorter_one_replaces_it() -> None:
     long = message_of(MOTION)
-    long.points[-1].time_from_start.sec = 2
+    long.points[-1].time_from_start.sec = 20
     with feedforward_bench(command_timeout=TIMEOUT) as node:
         node.answer(long)
         node.bench.spin_for(4 * TIMEOUT)
@@ -241,11 +241,16 @@ def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not
             node.publisher.publish(message_of(MOTION, stamp))
             while node.node.get_clock().now().nanoseconds < now + 1.5e9 * limit:
                 pass
-            rejected, silent = node.counters['TIME'], len(node.commands)
+            rejected, accepted = node.counters['TIME'], node.counters['accepted']
             assert node.bench.spin_until(lambda rejected=rejected: node.counters['TIME'] > rejected)
-            assert len(node.commands) == silent
-            node.answer(message_of(MOTION, (stamped and conversions.time(
-                node.node.get_clock().now().nanoseconds)) or None))
+            assert node.counters['accepted'] == accepted
+
+            def is_accepted(stamped: bool = stamped, accepted: int = accepted) -> bool:
+                """Send another one, which a busy machine may find too old as well."""
+                now = node.node.get_clock().now().nanoseconds
+                node.send(message_of(MOTION, conversions.time(now) if stamped else None))
+                return node.counters['accepted'] > accepted
+            assert node.bench.spin_until(is_accepted)
 
 
 def test_no_time_from_start_switches_the_watchdog_off() -> None:
@@ -292,7 +297,7 @@ def test_a_second_node_of_its_name_is_told() -> None:
         assert '2 nodes are called /feedforward' in said
         node.bench.executor.remove_node(twin)
         twin.destroy_node()
-        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT')
 
 
 def test_another_node_that_commands_the_same_drives_is_told() -> None:
@@ -304,7 +309,7 @@ def test_another_node_that_commands_the_same_drives_is_told() -> None:
         said = node.wait_for_status(code='CONFLICT', level='WARN')['message']
         assert f'/other_controller publishes on {topic}' in said
         other.destroy_node()
-        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT')
 
 
 def controller_state(position: np.ndarray, velocity: np.ndarray) -> Any:

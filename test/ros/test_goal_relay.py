@@ -76,8 +76,8 @@ class Relayed:
         before = self._servers()  # one that was killed is among them for as long as its lease
         process = self._processes.enter_context(node_process(
             [sys.executable, str(SERVER), *arguments], self._domain, self._log))
-        assert self._running.spin_until(lambda: self._servers() > before, 20)
-        assert self._running.spin_until(self.node.relay.server_is_there, 20)
+        assert self._running.spin_until(lambda: self._servers() > before)
+        assert self._running.spin_until(self.node.relay.server_is_there)
         self._running.spin_for(1.0)  # discovery is one-sided, and slow on a busy machine
         return process
 
@@ -94,9 +94,9 @@ class Relayed:
         self.sent = sent.result()
         return self.sent.get_result_async()
 
-    def answer(self, result: Any, within: float) -> tuple[int, list[int]]:
-        """Return status and sequence of an answer that comes within a time [s]."""
-        assert self._running.spin_until(result.done, within)
+    def answer(self, result: Any) -> tuple[int, list[int]]:
+        """Return status and sequence of an answer."""
+        assert self._running.spin_until(result.done)
         return result.result().status, list(result.result().result.sequence)
 
     def counted_to(self, last: int) -> bool:
@@ -118,9 +118,9 @@ def relayed(ros_domain: int, tmp_path: Path) -> Iterator[Relayed]:
 
 def test_feedback_result_and_refusal_pass_through(relayed: Relayed) -> None:
     relayed.controller()
-    assert relayed.answer(relayed.goal(5), 5) == (SUCCEEDED, [5])
+    assert relayed.answer(relayed.goal(5)) == (SUCCEEDED, [5])
     assert relayed.counted_to(5)
-    assert relayed.answer(relayed.goal(-1), 5) == (ABORTED, [])
+    assert relayed.answer(relayed.goal(-1)) == (ABORTED, [])
     assert relayed.node.said == ['the controller rejected the goal; its log has the reason']
 
 
@@ -129,7 +129,7 @@ def test_a_goal_is_cancelled_at_the_controller(relayed: Relayed) -> None:
     result = relayed.goal(1000)
     relayed.spin_until(lambda: len(relayed.feedback) > 2)
     relayed.sent.cancel_goal_async()
-    status, sequence = relayed.answer(result, 5)
+    status, sequence = relayed.answer(result)
     assert status == CANCELED
     assert 2 < sequence[0] < 1000
 
@@ -145,31 +145,31 @@ def test_a_controller_that_goes_in_the_middle_ends_the_goal(
     relayed.spin_until(lambda: len(relayed.feedback) > 2)
     process.send_signal(how)
     began = time.monotonic()
-    assert relayed.answer(result, PATIENCE + 3)[0] == ABORTED
+    assert relayed.answer(result)[0] == ABORTED
     assert time.monotonic() - began > PATIENCE / 2 or how == signal.SIGINT
     [said] = relayed.node.said
     assert 'in the middle of a goal' in said
     # The next one, to nobody or to one that hangs, ends as soon; and then it is back.
-    assert relayed.answer(relayed.goal(2), PATIENCE + 3)[0] == ABORTED
+    assert relayed.answer(relayed.goal(2))[0] == ABORTED
     if how == signal.SIGSTOP:
         process.send_signal(signal.SIGCONT)
         relayed.spin_for(1.0)  # it finds the first goal, and that it is to be cancelled
     else:
-        process.wait(10)
+        process.wait(60)
         relayed.controller()
     relayed.feedback.clear()
-    assert relayed.answer(relayed.goal(3), 5) == (SUCCEEDED, [3]), relayed.node.said
+    assert relayed.answer(relayed.goal(3)) == (SUCCEEDED, [3]), relayed.node.said
     assert relayed.counted_to(3)
 
 
 def test_without_feedback_the_end_of_the_motion_is_waited_for(relayed: Relayed) -> None:
     relayed.controller('mute')
     relayed.node.duration = 2.0
-    assert relayed.answer(relayed.goal(2 * PER_SECOND), 10)[0] == SUCCEEDED
+    assert relayed.answer(relayed.goal(2 * PER_SECOND))[0] == SUCCEEDED
     # One that should be there at once, and is not.
     relayed.node.duration = 0.0
     began = time.monotonic()
-    assert relayed.answer(relayed.goal(1000), PATIENCE + 3)[0] == ABORTED
+    assert relayed.answer(relayed.goal(1000))[0] == ABORTED
     assert time.monotonic() - began > PATIENCE
     assert relayed.node.said[-1] == (
         f'the server of /controller/count has been silent for {PATIENCE:g} s in the middle of a '

@@ -106,7 +106,7 @@ def test_a_simulation_at_half_speed_is_compared_in_its_own_time(ros_domain: int)
 
         timer = running.probe.create_timer(0.005, publish)
         try:
-            assert running.spin_until(lambda: len(nodes.to_dict()['time']) > 100, 20)
+            assert running.spin_until(lambda: len(nodes.to_dict()['time']) > 100)
             found = nodes.to_dict()
             assert found['trouble'] == ''
             # Half as many seconds have passed as on the wall; at that speed the forces agree.

@@ -55,7 +55,7 @@ class Cell:
             [round((moment - first) * 1e9) for moment in times]))
 
     def ready(self) -> None:
-        assert self.bench.spin_until(self.publisher.get_subscription_count, 20)
+        assert self.bench.spin_until(self.publisher.get_subscription_count)
         assert self.bench.connected()
 
 
@@ -105,10 +105,10 @@ def test_a_controller_completes_a_trajectory_that_ends_at_rest(
 def test_a_controller_whose_trajectory_ends_in_motion_is_stopped_along_the_path(
     cell: Cell, ros_domain: int, tmp_path: Path,
 ) -> None:
-    stop(cell, ros_domain, tmp_path / 'log', 3.0)
+    stop(cell, ros_domain, tmp_path / 'log', 4.5)
     given, end = cell.trajectories
     assert any(given.points[-1].velocities)
-    places, efforts = on_the_path(1.0, 3.5)
+    places, efforts = on_the_path(1.0, PATH.duration)
     nearest = []
     for point in end.points:
         away = np.abs(places - np.array(point.positions)).max(axis=1)
@@ -123,7 +123,7 @@ def test_a_controller_whose_trajectory_ends_in_motion_is_stopped_along_the_path(
     # From the speed of the path where the stop begins.
     speed = MODEL.drive_forces(PATH.motion([1.0 + 0.001 * nearest[0]])).mechanism.velocity[0]
     assert np.abs(end.points[0].velocities - speed).max() < 0.3 * np.abs(speed).max()
-    check_held(cell, 1.0, 3.5)
+    check_held(cell, 1.0, PATH.duration)
 
 
 class SimulatedClock:

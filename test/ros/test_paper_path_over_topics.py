@@ -47,10 +47,10 @@ def test_the_papers_path_goes_in_and_its_forces_come_out(
     with node_process(server, ros_domain, tmp_path / 'server.log') as feedforward:
         assert running.connected()
         with node_process(player, ros_domain, tmp_path / 'player.log') as playing:
-            assert running.spin_until(lambda: len(stamped) == len(commands) == len(times), 20)
-            assert playing.wait(5) == 0
+            assert running.spin_until(lambda: len(stamped) == len(commands) == len(times))
+            assert playing.wait(60) == 0
         feedforward.send_signal(signal.SIGTERM)
-        assert feedforward.wait(2) == 0
+        assert feedforward.wait(60) == 0
     expected = DriveModel.load(PAPER).drive_forces(HelicalPath().motion(times))
     np.testing.assert_allclose([c.data for c in commands], expected.total, rtol=0, atol=EQUAL)
     np.testing.assert_allclose([c.position for c in stamped], expected.mechanism.position,

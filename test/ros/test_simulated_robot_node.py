@@ -95,7 +95,7 @@ def test_it_follows_setpoints_and_holds_when_they_stop(robot: RobotBench) -> Non
         robot.keep_sending(robot.command(goal), robot.setpoint, 0.1)
         return bool(np.allclose(robot.position, goal, rtol=0, atol=5e-4))
 
-    assert robot.bench.spin_until(is_there, 20)
+    assert robot.bench.spin_until(is_there)
     assert robot.says('OK')()
     assert robot.bench.spin_until(robot.says('HOLD'))
     held = robot.position

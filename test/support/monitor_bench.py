@@ -39,7 +39,7 @@ class MonitorBench:
         motion = Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 1 / RATE))
         forces = DriveModel.load().drive_forces(motion)
         self.position, self.effort = forces.mechanism.position, forces.total
-        self.sent = 0
+        self.sent = self.published = 0  # samples, and messages of any kind
 
     def connect(self) -> None:
         """Wait until node and probe see each other on every topic."""
@@ -57,14 +57,22 @@ class MonitorBench:
             for field in ('position', 'effort'):
                 values = list(getattr(message, field))
                 setattr(message, field, [values[k] for k in ORDER] + [float('nan')])
-            self.publisher.publish(message)
+            self.publish(message)
             # No faster than the node takes them: the queue is finite.
             if row % 20 == 0:
-                assert self.arrived(row + 1)
+                assert self.arrived()
         self.sent += count
-        assert self.arrived(self.sent)
+        assert self.arrived()
         self.bench.spin_for(0.2)
 
-    def arrived(self, count: int) -> bool:
-        """Spin until the node has received so many messages."""
-        return self.bench.spin_until(lambda: self.node._counters['received'] >= count)
+    def says(self, code: str) -> bool:
+        """Spin until the status has a code."""
+        return self.bench.spin_until(lambda: self.bench.status[-1]['code'] == code)
+
+    def publish(self, message: JointState) -> None:
+        self.publisher.publish(message)
+        self.published += 1
+
+    def arrived(self) -> bool:
+        """Spin until the node has received all messages."""
+        return self.bench.spin_until(lambda: self.node._counters['received'] >= self.published)

@@ -53,12 +53,12 @@ class Bench:
     def connected(self) -> bool:
         """Spin until every topic listened to has its publisher, on both sides."""
         found = self.spin_until(
-            lambda: all(each.get_publisher_count() for each in self.subscriptions), 20)
+            lambda: all(each.get_publisher_count() for each in self.subscriptions))
         # Discovery is one-sided: a publisher may see us a moment after we see it. Subscriptions
         # are announced in order, so a node that answers the latest one knows all the others.
         for topic in self._status_topics:
             answers = self.listen(String, topic, LATCHED)
-            found = found and self.spin_until(lambda answers=answers: answers, 20)
+            found = found and self.spin_until(lambda answers=answers: answers)
         self.spin_for(0.5)
         return found
 
@@ -69,8 +69,8 @@ class Bench:
             String, topic, lambda message: self.status.append(checked(message.data)),
             LATCHED)
 
-    def spin_until(self, predicate: Callable[[], Any], timeout: float = 10.0) -> bool:
-        """Spin until the predicate holds; False where it does not in time."""
+    def spin_until(self, predicate: Callable[[], Any], timeout: float = 60.0) -> bool:
+        """Spin until the predicate holds; False where it does not in time, on any machine."""
         deadline = time.monotonic() + timeout
         while not predicate():
             if time.monotonic() > deadline:
