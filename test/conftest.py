@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from discovery import in_a_hurry
@@ -55,6 +56,24 @@ def package(tmp_path: Path) -> Iterator[ModuleType]:
 
     with installed(tmp_path) as module:
         yield module
+
+
+@pytest.fixture
+def running() -> Iterator[Any]:
+    """Bench of a probe that talks to processes."""
+    from node_bench import bench  # with rclpy, after the domain is set
+
+    with bench() as probe:
+        yield probe
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Any]:
+    """Chromium."""
+    from browser import chromium
+
+    with chromium() as running:
+        yield running
 
 
 @pytest.fixture(autouse=True)

@@ -12,43 +12,21 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from pprs_command import pprs
+from workbench_bench import AXIS, write_axis
 
-from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
-from benchmarks.hidden.recordings import driven
 from pprs_dynamics import DriveModel, __version__
-from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.simulation.injection import Choice, Injection, PlainRobot
-from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.simulated_robot import SensorSettings
-
-HIDDEN, RATE = 'coulomb_friction', 250.0
-EFFECT = Choice(HIDDEN, np.random.default_rng(11))
-
-
-def record(path: Path, seed: int, duration: float) -> None:
-    """Write a recording of a robot whose friction the model does not know"""
-    model = DriveModel.load()
-    time = np.arange(0.0, duration, 1 / RATE)
-    motion = driven(model, Excitation(duration=duration, seed=seed).motion(time))
-    run = Injection(PlainRobot(as_mechanism(model), motion), [EFFECT], np.random.default_rng(0))
-    noise = EffortNoise(NoiseSettings(), np.random.default_rng(seed)).samples(len(time))
-    write_recording(path, Recording.from_arrays(
-        path.name, time, SensorSettings().quantised(run.position), None, run.efforts + noise))
 
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Diagnose one recording, with another one held out."""
     folder = tmp_path_factory.mktemp('diagnose')
-    record(folder / 'run.csv', 1, 14.0)
-    record(folder / '<b>other<b>.mcap', 2, 8.0)
-    done = pprs('diagnose', 'run.csv', '--validate', '<b>other<b>.mcap', '--json', 'result.json',
-                '--report', 'page.html', cwd=folder)
+    write_axis(folder / 'run.csv', 1)
+    write_axis(folder / '<b>other<b>.mcap', 2)
+    done = pprs('diagnose', 'run.csv', '--validate', '<b>other<b>.mcap', '--model', AXIS, '--json',
+                'result.json', '--report', 'page.html', cwd=folder)
     assert done.returncode == 0, done.stderr
     (folder / 'stdout.txt').write_text(done.stdout)
     return folder
@@ -71,13 +49,13 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
                                'error_after', 'held_out_before', 'held_out_after', 'evidence',
                                'without', 'since', 'course', 'held_out_certainty'}
-        assert set(effect['drives']) <= set(DRIVES)
+        assert effect['drives'] == ['axis']
         for parameter in effect['parameters'].values():
             assert set(parameter) == {'value', 'std', 'unit'}
     for candidate in result['candidates']:
         assert set(candidate) == {'name', 'drives', 'evidence', 'error_after'}
-    assert set(result['noise_floors']) == set(DRIVES)
-    assert [effect['name'] for effect in result['sets'][0]['effects']] == [HIDDEN]
+    assert set(result['noise_floors']) == {'axis'}
+    assert [effect['name'] for effect in result['sets'][0]['effects']] == ['coulomb_friction']
     assert result['held_out_on'] == 'validation'
     assert all(isinstance(warning, str) for warning in result['warnings'])
 
@@ -86,9 +64,9 @@ def test_the_page_is_a_record_that_can_be_filed(folder: Path) -> None:
     page = html.unescape((folder / 'page.html').read_text())
     for name in ('run.csv', '<b>other<b>.mcap'):
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in page
-    assert DriveModel.load().fingerprint in page
-    assert ("pprs diagnose run.csv --validate '<b>other<b>.mcap' --json result.json "
-            '--report page.html') in page
-    assert '3500 samples, 14.00 s at 250 Hz' in page
+    assert DriveModel.load(AXIS).fingerprint in page
+    assert (f"pprs diagnose run.csv --validate '<b>other<b>.mcap' --model {AXIS} --json "
+            'result.json --report page.html') in page
+    assert '1600 samples, 8.00 s at 200 Hz' in page
     assert f'pprs_dynamics {__version__}' in page
     assert datetime.now(UTC).date().isoformat()[:7] in page

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
+from workbench_bench import AXIS, write_axis
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.commands.survey import cluster, run_each
@@ -29,29 +30,10 @@ from pprs_dynamics.app.fleet.recordings import (
 from pprs_dynamics.app.fleet.trend import find_steps, fleet_trends
 from pprs_dynamics.errors import UnreadableFileError
 
-MODEL = 'config/single_axis.yaml'
+MODEL = str(AXIS)
 EFFECTS = 'coulomb_friction'
 DAYS = 30
 FIRST = datetime(2026, 3, 1, tzinfo=UTC)
-
-
-def write_axis(path: Path, friction: float = 4.0, seed: int = 0) -> Path:
-    """Write 8 s of the single axis, with Coulomb friction that its model lacks [N]."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(800) / 100
-    position = 0.05 * np.sin(np.pi * time) + 0.02 * np.sin(2.6 * np.pi * time)
-    velocity = np.pi * (0.05 * np.cos(np.pi * time) + 0.052 * np.cos(2.6 * np.pi * time))
-    acceleration = -np.pi ** 2 * (0.05 * np.sin(np.pi * time)
-                                  + 0.1352 * np.sin(2.6 * np.pi * time))
-    # The numbers of config/single_axis.yaml.
-    effort = (95.109 * acceleration + 203.5 * velocity - 3.165
-              + (20.394 + friction) * np.tanh(velocity / 0.0003))
-    effort = effort + rng.normal(scale=2.0, size=len(time))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    rows = '\n'.join(f'{t:.4f},{q:.9f},{f:.6f}' for t, q, f in zip(
-        time, position, effort, strict=True))
-    path.write_text(f'time,axis/position,axis/effort\n{rows}\n')
-    return path
 
 
 def days(count: int) -> pandas.Series:
@@ -144,7 +126,7 @@ def test_robots_have_the_names_of_their_folders(tmp_path: Path) -> None:
 def test_a_survey_writes_documented_columns_and_does_nothing_twice(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for k in range(3):
-        write_axis(tmp_path / 'robot_1' / f'{k}.csv', seed=k)
+        write_axis(tmp_path / 'robot_1' / f'{k}.csv', k, friction=4.0)
     (tmp_path / 'robot_1' / 'bad.csv').write_text('this is no recording\n')
     store, summary = tmp_path / 'store', tmp_path / 'survey.json'
     command = ['survey', str(tmp_path / 'robot_1'), '--model', MODEL, '--effects', EFFECTS,
@@ -181,8 +163,8 @@ def test_of_a_worker_that_is_killed_only_the_item_that_kills_it_is_lost() -> Non
 
 def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_axis(tmp_path / 'a' / 'right.csv', 0.0, seed=1)
-    write_axis(tmp_path / 'a' / 'worn.csv', 6.0, seed=2)
+    write_axis(tmp_path / 'a' / 'right.csv', 1, friction=0.0)
+    write_axis(tmp_path / 'a' / 'worn.csv', 2, friction=6.0)
     store = tmp_path / 'store'
     assert main(['survey', str(tmp_path / 'a'), '--model', MODEL, '--output', str(store),
                  '--workers', '1']) == 0

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, chromium, needs_browser
+from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, needs_browser
 from made_up_diagnosis import (
     NOISE,
     calibration,
@@ -69,12 +69,6 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp('pages')
     return {name: page.write(folder / f'{name}.html')
             for name, page in made_up_pages().items()}
-
-
-@pytest.fixture(scope='module')
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture

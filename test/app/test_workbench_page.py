@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from accessibility import broken_rules
-from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, chromium, needs_browser
+from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, needs_browser
 from workbench_bench import write_hidden
 from workbench_page import Page
 from workbench_server import Workbench, workbench
@@ -26,12 +26,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_hidden(folder / 'run.csv', 1)
     write_hidden(folder / 'other.csv', 2)
     return folder
-
-
-@pytest.fixture(scope='module')
-def browser() -> Iterator[Any]:
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture(scope='module')

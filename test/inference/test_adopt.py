@@ -32,7 +32,7 @@ from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
 HIDDEN, WRONG = 'coulomb_friction', 'drive_spring'
-DURATION = 15.0  # [s]
+DURATION = 10.0  # [s]
 NOISE = 0.05  # [N], of recordings made without the simulated robot
 
 

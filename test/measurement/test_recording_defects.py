@@ -8,24 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import made_up_recordings as made
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from made_up_recordings import (
-    QUANTITIES,
-    STEP,
-    assert_same,
-    judged,
-    kinds,
-    measured,
-    message,
-    states_of,
-    the,
-    the_one,
-    write_plain_bag,
-)
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError
@@ -37,47 +25,47 @@ from pprs_dynamics.measurement.files.samples import Samples
 @pytest.mark.parametrize('seed', range(2))
 def test_a_sound_recording_has_nothing_to_tell(seed: int) -> None:
     # Pauses, slow and fast motion, jitter of a tenth of a step.
-    arrays = measured(4000, seed=seed)
+    arrays = made.measured(4000, seed=seed)
     rng = np.random.default_rng(seed)
-    arrays['time'] = arrays['time'] + rng.uniform(-0.1, 0.1, 4000) * STEP
+    arrays['time'] = arrays['time'] + rng.uniform(-0.1, 0.1, 4000) * made.STEP
     pause = slice(1000, 2000)
     arrays['position'][pause] = arrays['position'][1000] + 1e-6 * rng.integers(-1, 2, (1000, 6))
     arrays['position'][2000:] += arrays['position'][1999] - arrays['position'][2000]
-    recording = judged(arrays)
+    recording = made.judged(arrays)
     assert recording.findings == ()
     assert recording.segments == (slice(0, 4000),)
 
 
 def test_non_finite_times_and_positions_are_dropped() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['time'][[100, 200]] = np.nan, np.inf
     arrays['position'][300, 0], arrays['position'][[301, 400], 4] = np.nan, -np.inf
-    recording = judged(arrays)
-    assert the_one(recording, 'non_finite_time').count == 2
-    finding = the_one(recording, 'non_finite_position')
+    recording = made.judged(arrays)
+    assert made.the_one(recording, 'non_finite_time').count == 2
+    finding = made.the_one(recording, 'non_finite_position')
     assert finding.count == 3
     assert finding.spans == ((0.6, 0.602), (0.8, 0.8))
     assert finding.drives == ('slide_1', 'lift_2')
     kept = np.setdiff1d(np.arange(1000), [100, 200, 300, 301, 400])
     np.testing.assert_array_equal(recording.effort, arrays['effort'][kept])
-    assert the_one(recording, 'lost_samples').count == 5
+    assert made.the_one(recording, 'lost_samples').count == 5
     assert recording.segments == (slice(0, 995),)
 
 
 @pytest.mark.parametrize('noise', [0.0, 0.02])
 def test_efforts_that_fall_to_zero_for_a_tick_were_not_measured(noise: float) -> None:
     rng = np.random.default_rng(2)
-    time = np.arange(2000) * STEP
+    time = np.arange(2000) * made.STEP
     position = 0.1 * np.sin(np.arange(2000)[:, None] * [0.01, 0.013])
     # One weighs 20 N, the other passes through 0 all the time.
     effort = np.array([20.0, 0.0]) + [2.0, 8.0] * np.cos(np.arange(2000)[:, None] * [0.01, 0.013])
     effort += 0.02 * rng.normal(size=effort.shape)
     sound = Recording.from_arrays('sound', time, position, None, effort, ('upright', 'level'))
-    assert 'effort_zero' not in kinds(sound)
+    assert 'effort_zero' not in made.kinds(sound)
     lost = [300, 900, 901]
     effort[lost] = noise * rng.normal(size=(3, 2))
     recording = Recording.from_arrays('run', time, position, None, effort, ('upright', 'level'))
-    finding = the_one(recording, 'effort_zero')
+    finding = made.the_one(recording, 'effort_zero')
     assert finding.count == 3
     assert finding.text.endswith('they count as not measured')
     assert np.flatnonzero(np.isnan(recording.effort[:, 0])).tolist() == lost
@@ -89,20 +77,20 @@ def test_efforts_that_fall_to_zero_for_a_tick_were_not_measured(noise: float) ->
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), reach=st.integers(1, 5))
 def test_any_disorder_within_reach_is_undone(seed: int, reach: int) -> None:
-    arrays = measured(200)
+    arrays = made.measured(200)
     shift = np.random.default_rng(seed).uniform(0, reach, 200)
     order = np.argsort(np.arange(200) + shift, kind='stable')
-    recording = judged({name: values[order] for name, values in arrays.items()})
-    assert_same(recording, arrays)
+    recording = made.judged({name: values[order] for name, values in arrays.items()})
+    made.assert_same(recording, arrays)
     assert recording.segments == (slice(0, 200),)
 
 
 @pytest.mark.parametrize('back', [0.2, 2.0, 1.7e9])
 def test_a_clock_that_is_set_back_splits(back: float) -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['time'] = arrays['time'] + np.where(np.arange(1000) < 600, back, 0.0)
-    recording = judged(arrays)
-    finding = the(recording, 'clock_reset')
+    recording = made.judged(arrays)
+    finding = made.the(recording, 'clock_reset')
     assert finding.count == 1
     assert finding.spans == ((1.2, 1.2),)
     assert recording.segments == (slice(0, 600), slice(600, 1000))
@@ -110,74 +98,74 @@ def test_a_clock_that_is_set_back_splits(back: float) -> None:
 
 
 def test_stamps_from_before_the_clock_was_set_do_not_cost_digits(tmp_path: Path) -> None:
-    arrays = measured(600)
-    states = states_of(arrays, time=arrays['time'] + 1_700_000_000)
-    states[0] = message(0, DRIVES, *(arrays[name][0] for name in QUANTITIES))
-    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
+    arrays = made.measured(600)
+    states = made.states_of(arrays, time=arrays['time'] + 1_700_000_000)
+    states[0] = made.message(0, DRIVES, *(arrays[name][0] for name in made.QUANTITIES))
+    recording = read_recording(made.write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
     assert recording.epoch == 1_700_000_000
     assert recording.segments == (slice(1, 600),)
     # The test itself made these stamps from floats of seconds since 1970, good to 0.24 us.
-    assert np.abs(np.diff(recording.time[1:]) - STEP).max() < 1e-6
-    assert kinds(recording) == {'gap', 'short_segment'}
+    assert np.abs(np.diff(recording.time[1:]) - made.STEP).max() < 1e-6
+    assert made.kinds(recording) == {'gap', 'short_segment'}
 
 
 def test_of_equal_stamps_the_first_sample_is_kept() -> None:
-    arrays = measured()
+    arrays = made.measured()
     order = np.sort(np.concatenate((np.arange(1000), [10, 10, 700])))
     doubled = {name: values[order] for name, values in arrays.items()}
     doubled['effort'][[11, 12]] = 99
-    recording = judged(doubled)
-    assert_same(recording, arrays)
-    finding = the(recording, 'duplicate_stamps')
+    recording = made.judged(doubled)
+    made.assert_same(recording, arrays)
+    finding = made.the(recording, 'duplicate_stamps')
     assert finding.count == 3
     assert finding.spans == ((0.02, 0.02), (1.4, 1.4))
 
 
 @pytest.mark.parametrize('length', [1, 3])
 def test_spikes_of_position_are_dropped(length: int) -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['position'][400:400 + length, 3] += 0.03
-    recording = judged(arrays)
-    finding = the_one(recording, 'position_spike')
+    recording = made.judged(arrays)
+    finding = made.the_one(recording, 'position_spike')
     assert (finding.count, finding.drives) == (length, ('lift_1',))
-    assert finding.spans == ((pytest.approx(0.8), pytest.approx(0.8 + STEP * (length - 1))),)
-    assert the_one(recording, 'lost_samples').count == length
+    assert finding.spans == ((pytest.approx(0.8), pytest.approx(0.8 + made.STEP * (length - 1))),)
+    assert made.the_one(recording, 'lost_samples').count == length
     kept = np.setdiff1d(np.arange(1000), np.arange(400, 400 + length))
     np.testing.assert_array_equal(recording.position, arrays['position'][kept])
     assert recording.segments == (slice(0, 1000 - length),)
 
 
 def test_a_position_that_jumps_splits() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['position'][500:, 1] -= 0.03
-    recording = judged(arrays)
-    finding = the(recording, 'position_jump')
+    recording = made.judged(arrays)
+    finding = made.the(recording, 'position_jump')
     assert (finding.count, finding.drives, finding.spans) == (1, ('slide_2',), ((1.0, 1.0),))
     assert recording.segments == (slice(0, 500), slice(500, 1000))
 
 
 @pytest.mark.parametrize('factor', [0.5, 5])
 def test_a_rate_that_changes_is_one_motion_with_irregular_steps(factor: float) -> None:
-    arrays = measured()
-    steps = np.full(1000, STEP)
+    arrays = made.measured()
+    steps = np.full(1000, made.STEP)
     steps[450:] *= factor
     arrays['time'] = np.cumsum(steps)
-    recording = judged(arrays)
-    the(recording, 'irregular_steps')
+    recording = made.judged(arrays)
+    made.the(recording, 'irregular_steps')
     assert recording.segments == (slice(0, 1000),)
 
 
 def test_gaps_split_and_lost_samples_do_not() -> None:
-    arrays = measured()
+    arrays = made.measured()
     gone = [100, 300, 301, *range(500, 509), *range(700, 710)]
     kept = np.setdiff1d(np.arange(1000), gone)
-    recording = judged({name: values[kept] for name, values in arrays.items()})
-    assert kinds(recording) == {'gap', 'lost_samples'}
-    lost = the_one(recording, 'lost_samples')
+    recording = made.judged({name: values[kept] for name, values in arrays.items()})
+    assert made.kinds(recording) == {'gap', 'lost_samples'}
+    lost = made.the_one(recording, 'lost_samples')
     # Nine lost samples make a step of 20 ms, no longer than a cubic can bridge; ten make a gap.
     assert lost.count == 1 + 2 + 9
     np.testing.assert_allclose(lost.spans, [(0.198, 0.202), (0.598, 0.604), (0.998, 1.018)])
-    gap = the_one(recording, 'gap')
+    gap = made.the_one(recording, 'gap')
     assert gap.count == 1
     np.testing.assert_allclose(gap.spans, [(1.398, 1.42)])
     assert recording.segments == (slice(0, 688), slice(688, 978))
@@ -187,7 +175,7 @@ def test_gaps_split_and_lost_samples_do_not() -> None:
 def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
     unit: str, scale: float, tmp_path: Path,
 ) -> None:
-    arrays = measured(1001)
+    arrays = made.measured(1001)
     stamps = np.rint(scale * arrays['time']).astype(np.int64)
     header = ['time', *(f'{drive}/position' for drive in DRIVES)]
     path = tmp_path / 'run.csv'
@@ -203,7 +191,7 @@ def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
 
 
 def test_what_pandas_has_for_missing_values_counts_as_missing() -> None:
-    arrays = measured(500)
+    arrays = made.measured(500)
     frames = {name: pd.DataFrame(values).astype('Float64') for name, values in arrays.items()
               if name != 'time'}
     frames['effort'].iloc[10, 2] = frames['velocity'].iloc[20, 3] = pd.NA
@@ -225,15 +213,15 @@ def test_what_pandas_has_for_missing_values_counts_as_missing() -> None:
     ('time', [['a']]), ('position', 'many'), ('effort', {'slide_1': 3})])
 def test_what_is_no_number_is_named(quantity: str, values: Any) -> None:
     with pytest.raises(MotionError, match=f'^{quantity}: '):
-        Recording.from_arrays('wrong', **{**measured(100), quantity: values})
+        Recording.from_arrays('wrong', **{**made.measured(100), quantity: values})
 
 
 def test_efforts_that_are_not_finite_count_as_not_measured() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['effort'][10:20, 2], arrays['effort'][15:40, 5], arrays['effort'][90, 0] = (
         np.nan, np.inf, -np.inf)
-    recording = judged(arrays)
-    finding = the(recording, 'effort_not_measured')
+    recording = made.judged(arrays)
+    finding = made.the(recording, 'effort_not_measured')
     assert finding.count == 10 + 25 + 1
     assert finding.spans == ((0.02, 0.078), (0.18, 0.18))
     assert finding.drives == ('slide_1', 'slide_3', 'lift_3')
@@ -245,14 +233,14 @@ def test_efforts_that_are_not_finite_count_as_not_measured() -> None:
 
 @pytest.mark.parametrize('size', [1e308, 1e13])
 def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float) -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['effort'][10:20, 2], arrays['velocity'][30, 1], arrays['position'][40, 0] = (
         size, size, size)
-    recording = judged(arrays)
-    assert the_one(recording, 'impossible_effort').drives == ('slide_3',)
-    assert the_one(recording, 'impossible_effort').count == 10
-    assert the_one(recording, 'impossible_velocity').count == 1
-    dropped = the_one(recording, 'impossible_position')
+    recording = made.judged(arrays)
+    assert made.the_one(recording, 'impossible_effort').drives == ('slide_3',)
+    assert made.the_one(recording, 'impossible_effort').count == 10
+    assert made.the_one(recording, 'impossible_velocity').count == 1
+    dropped = made.the_one(recording, 'impossible_position')
     assert 'far from all others, at 0.08 s; those samples are dropped' in dropped.text
     assert np.isnan(recording.effort).sum() == 10
     assert len(recording.time) == len(arrays['time']) - 1
@@ -260,7 +248,7 @@ def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float)
 
 
 def test_efforts_at_the_limit_of_a_drive_are_left_out() -> None:
-    arrays = measured()
+    arrays = made.measured()
     limit = 0.5 * float(np.abs(arrays['effort'][:, 1]).max())
     beyond = np.abs(arrays['effort'][:, 1]) > limit
     clipped = np.clip(arrays['effort'], -limit, limit)
@@ -269,52 +257,52 @@ def test_efforts_at_the_limit_of_a_drive_are_left_out() -> None:
                       np.where(np.arange(6) == 1, clipped + noise, arrays['effort']),
                       effort_limits=(np.inf, limit, *[np.inf] * 4))
     judgement = Judgement(samples)
-    assert the_one(judgement, 'saturated_effort').drives == ('slide_2',)
+    assert made.the_one(judgement, 'saturated_effort').drives == ('slide_2',)
     assert np.isnan(judgement.samples.effort[beyond, 1]).all()
     assert np.isfinite(judgement.samples.effort[:, [0, 2, 3, 4, 5]]).all()
 
 
 def test_an_effort_that_stands_still_while_its_drive_moves_is_told() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['effort'][200:600, 3] = 1.5
-    finding = the(judged(arrays), 'constant_effort')
+    finding = made.the(made.judged(arrays), 'constant_effort')
     assert (finding.count, finding.drives) == (1, ('lift_1',))
     assert finding.spans == ((0.4, pytest.approx(1.198)),)
     # At rest a coarse sensor may well say the same for long.
     arrays['position'][200:600, 3] = arrays['position'][200, 3]
     arrays['position'][600:, 3] += arrays['position'][599, 3] - arrays['position'][600, 3]
-    assert judged(arrays).findings == ()
+    assert made.judged(arrays).findings == ()
 
 
 @pytest.mark.parametrize('quantity', ['position', 'effort'])
 def test_values_that_a_slower_source_repeats_are_used_once(quantity: str) -> None:
-    arrays = measured()
+    arrays = made.measured()
     held = np.arange(len(arrays['time'])) // 4 * 4
     arrays[quantity] = arrays[quantity][held]
-    recording = judged(arrays)
-    assert '125 new ones a second' in the(recording, {
+    recording = made.judged(arrays)
+    assert '125 new ones a second' in made.the(recording, {
         'position': 'held_position', 'effort': 'held_effort'}[quantity]).text
     used = recording.position if quantity == 'position' else recording.effort
     assert np.isfinite(used).all(axis=1).sum() == len(held) // 4
 
 
 def test_efforts_that_are_cut_off_on_one_side_are_left_out() -> None:
-    arrays = measured()
+    arrays = made.measured()
     limit = float(np.quantile(arrays['effort'][:, 1], 0.9))
     arrays['effort'][:, 1] = np.minimum(arrays['effort'][:, 1], limit)
-    recording = judged(arrays)
-    assert f'cut off at {limit:.4g}' in the(recording, 'saturated_effort').text
+    recording = made.judged(arrays)
+    assert f'cut off at {limit:.4g}' in made.the(recording, 'saturated_effort').text
     assert np.nanmax(recording.effort[:, 1]) < limit
 
 
 @pytest.mark.parametrize('kept', [0.03, 0.4])
 def test_a_drive_whose_efforts_are_nearly_all_cut_off_is_not_judged(kept: float) -> None:
-    arrays = measured()
+    arrays = made.measured()
     limit = float(np.quantile(np.abs(arrays['effort'][:, 1]), kept))
     arrays['effort'][:, 1] = np.clip(arrays['effort'][:, 1], -limit, limit)
-    recording = judged(arrays)
+    recording = made.judged(arrays)
     is_lost = kept < 0.1
-    finding = the(recording, 'mostly_saturated' if is_lost else 'saturated_effort')
+    finding = made.the(recording, 'mostly_saturated' if is_lost else 'saturated_effort')
     assert finding.drives == ('slide_2',)
     assert ('too few efforts remain to judge this drive' in finding.text) == is_lost
     assert np.isnan(recording.effort[:, 1]).mean() == pytest.approx(
@@ -323,29 +311,29 @@ def test_a_drive_whose_efforts_are_nearly_all_cut_off_is_not_judged(kept: float)
 
 
 def test_repeated_messages_are_told() -> None:
-    arrays = measured()
-    for name in QUANTITIES:
+    arrays = made.measured()
+    for name in made.QUANTITIES:
         arrays[name][300:360] = arrays[name][300]
         arrays[name][700:705] = arrays[name][700]
-    recording = judged(arrays)
-    finding = the_one(recording, 'frozen_samples')
+    recording = made.judged(arrays)
+    finding = made.the_one(recording, 'frozen_samples')
     assert finding.count == 59
     assert finding.spans == ((0.6, pytest.approx(0.718)),)
 
 
 def test_a_robot_at_rest_without_efforts_is_not_called_frozen() -> None:
-    arrays = {**measured(), 'effort': None, 'velocity': None}
+    arrays = {**made.measured(), 'effort': None, 'velocity': None}
     arrays['position'][300:500] = arrays['position'][300]
     arrays['position'][500:] += arrays['position'][499] - arrays['position'][500]
-    assert kinds(judged(arrays)) == {'no_effort', 'missing_velocity'}
+    assert made.kinds(made.judged(arrays)) == {'no_effort', 'missing_velocity'}
 
 
 def test_segments_too_short_to_filter_are_not_used() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['time'][100:119] += 1
     arrays['time'][119:] += 2
-    recording = judged(arrays)
-    finding = the_one(recording, 'short_segment')
+    recording = made.judged(arrays)
+    finding = made.the_one(recording, 'short_segment')
     assert finding.count == 1
     np.testing.assert_allclose(finding.spans, [(1.2, 1.236)])
     assert recording.segments == (slice(0, 100), slice(119, 1000))

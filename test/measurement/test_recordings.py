@@ -12,31 +12,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import made_up_recordings as made
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from made_up_recordings import (
-    QUANTITIES,
-    STATE,
-    STEP,
-    STEP_NS,
-    STORE,
-    SUFFIXES,
-    Arrays,
-    assert_same,
-    by_own_writer,
-    judged,
-    kinds,
-    measured,
-    message,
-    states_of,
-    table,
-    the,
-    the_one,
-    write_plain_bag,
-)
 from pprs_command import pprs
 from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin
@@ -56,28 +37,28 @@ from pprs_dynamics.measurement.files.repeats import shared_samples
 # ---------------------------------------------------------------------------------- formats
 
 
-def by_rosbags(storage: StoragePlugin) -> Callable[[Path, Arrays], Path]:
-    return lambda folder, arrays: write_plain_bag(
-        folder / 'bag', {'/pprs/joint_states': states_of(arrays)}, storage)
+def by_rosbags(storage: StoragePlugin) -> Callable[[Path, made.Arrays], Path]:
+    return lambda folder, arrays: made.write_plain_bag(
+        folder / 'bag', {'/pprs/joint_states': made.states_of(arrays)}, storage)
 
 
-def by_pandas(folder: Path, arrays: Arrays) -> Path:
-    table(arrays).to_csv(folder / 'pandas.csv', index=False)
+def by_pandas(folder: Path, arrays: made.Arrays) -> Path:
+    made.table(arrays).to_csv(folder / 'pandas.csv', index=False)
     return folder / 'pandas.csv'
 
 
-WRITERS = {**{f'own{suffix}': by_own_writer(suffix) for suffix in SUFFIXES},
+WRITERS = {**{f'own{suffix}': made.by_own_writer(suffix) for suffix in made.SUFFIXES},
            'rosbags_mcap': by_rosbags(StoragePlugin.MCAP),
            'rosbags_sqlite3': by_rosbags(StoragePlugin.SQLITE3), 'pandas': by_pandas}
 
 
 @pytest.mark.parametrize('write', WRITERS.values(), ids=WRITERS)
 def test_every_writer_gives_the_same_arrays_and_nothing_to_tell(
-    write: Callable[[Path, Arrays], Path], tmp_path: Path,
+    write: Callable[[Path, made.Arrays], Path], tmp_path: Path,
 ) -> None:
-    arrays = measured(700)
+    arrays = made.measured(700)
     recording = read_recording(write(tmp_path, arrays))
-    assert_same(recording, arrays)
+    made.assert_same(recording, arrays)
     assert recording.findings == ()
     assert recording.segments == (slice(0, 700),)
     assert recording.drives == DRIVES
@@ -87,11 +68,11 @@ def test_every_writer_gives_the_same_arrays_and_nothing_to_tell(
 def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
     suffix: str, tmp_path: Path,
 ) -> None:
-    arrays = measured(300)
-    stamps = 1_763_000_123_456_789_123 + STEP_NS * np.arange(300)
-    source = write_plain_bag(tmp_path / 'source', {
-        '/joint_states': [message(int(stamp), DRIVES, *(arrays[name][k] for name in QUANTITIES))
-                          for k, stamp in enumerate(stamps)]})
+    arrays = made.measured(300)
+    stamps = 1_763_000_123_456_789_123 + made.STEP_NS * np.arange(300)
+    source = made.write_plain_bag(tmp_path / 'source', {
+        '/joint_states': [made.message(int(stamp), DRIVES, *(
+            arrays[name][k] for name in made.QUANTITIES)) for k, stamp in enumerate(stamps)]})
     recording = read_recording(source)
     assert recording.epoch == 1_763_000_123
     # As floats of seconds since 1970 they would be 120 ns off.
@@ -113,7 +94,7 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
     recording = Recording.from_arrays('x', time, np.sin(time)[:, None], effort / 7, effort,
                                       ('axis',))
     write_recording(tmp_path / 'x.csv', recording)
-    assert_same(read_recording(tmp_path / 'x.csv', ('axis',)),
+    made.assert_same(read_recording(tmp_path / 'x.csv', ('axis',)),
                 {'time': time, 'position': np.sin(time)[:, None], 'velocity': effort / 7,
                  'effort': effort})
 
@@ -122,16 +103,16 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
 
 
 def test_drives_are_found_by_name_among_other_joints_in_any_order(tmp_path: Path) -> None:
-    arrays = measured(600)
+    arrays = made.measured(600)
     names = ('gripper', *DRIVES[::-1], 'door')
     wide = {name: np.column_stack((np.ones(600), arrays[name][:, ::-1], np.zeros(600)))
-            for name in QUANTITIES}
-    path = write_plain_bag(tmp_path / 'bag', {
-        '/joint_states': states_of({'time': arrays['time'], **wide}, names)})
+            for name in made.QUANTITIES}
+    path = made.write_plain_bag(tmp_path / 'bag', {
+        '/joint_states': made.states_of({'time': arrays['time'], **wide}, names)})
     recording = read_recording(path)
-    assert_same(recording, arrays)
-    assert the(recording, 'ignored_joints').count == 2
-    assert 'door, gripper' in the(recording, 'ignored_joints').text
+    made.assert_same(recording, arrays)
+    assert made.the(recording, 'ignored_joints').count == 2
+    assert 'door, gripper' in made.the(recording, 'ignored_joints').text
 
 
 @settings(max_examples=25)
@@ -149,22 +130,22 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
         if shuffle.random() < 0.1:
             names = names[:-1]
         arrays = [[shuffle.gauss(0, 1) for _ in names] if shuffle.random() < 0.9 else []
-                  for _ in QUANTITIES]
-        state = message(shuffle.randrange(2**31 * 10**9), names, *arrays)
+                  for _ in made.QUANTITIES]
+        state = made.message(shuffle.randrange(2**31 * 10**9), names, *arrays)
         little = not (big_endian and k % 3 == 0)
-        data.append(bytes(STORE.serialize_cdr(state, STATE, little_endian=little)))
+        data.append(bytes(made.STORE.serialize_cdr(state, made.STATE, little_endian=little)))
     blocks = JointStateBlocks(DRIVES)
     blocks.add(data[:70], list(range(70)))
     blocks.add(data[70:], list(range(70, 120)))
     assert blocks.names == set(joints)
-    states = [STORE.deserialize_cdr(raw, STATE) for raw in data]
+    states = [made.STORE.deserialize_cdr(raw, made.STATE) for raw in data]
     whole = [k for k, state in enumerate(states)
              if {*DRIVES} <= {*state.name} and len(state.position) == len(state.name)]
     stamps, received, *arrays = blocks.arrays()
     assert received.tolist() == whole
     assert stamps.tolist() == [states[k].header.stamp.sec * 10**9 + states[k].header.stamp.nanosec
                                for k in whole]
-    for quantity, found in zip(QUANTITIES, arrays, strict=True):
+    for quantity, found in zip(made.QUANTITIES, arrays, strict=True):
         values = [getattr(states[k], quantity) for k in whole]
         np.testing.assert_array_equal(found, np.array([
             [numbers[list(states[k].name).index(drive)] for drive in DRIVES] if len(numbers) else
@@ -175,7 +156,7 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
 @pytest.mark.parametrize('frame', ['', 'base'])
 def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str) -> None:
     # rmw_fastrtps leaves bytes behind the message where a sequence is empty.
-    values = {name: [] if name in absent else [1.5, -2.5, 3.5] for name in QUANTITIES}
+    values = {name: [] if name in absent else [1.5, -2.5, 3.5] for name in made.QUANTITIES}
     state = JointState(name=['b', 'other', 'a'], **values)
     state.header.stamp.sec, state.header.stamp.nanosec = 12, 345
     state.header.frame_id = frame
@@ -183,7 +164,7 @@ def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str)
     blocks.add([serialize_message(state)] * 3, [0, 1, 2])
     stamps, _, *arrays = blocks.arrays()
     assert stamps.tolist() == [12 * 10**9 + 345] * 3
-    for name, array in zip(QUANTITIES, arrays, strict=True):
+    for name, array in zip(made.QUANTITIES, arrays, strict=True):
         expected = [np.nan, np.nan] if name in absent else [3.5, 1.5]
         np.testing.assert_array_equal(array, [expected] * 3)
 
@@ -197,46 +178,46 @@ def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None
 
 
 def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> None:
-    arrays = measured(60)
-    states = states_of(arrays)
-    half = [message(k, DRIVES[:3], np.ones(3), [], []) for k in range(20)]
+    arrays = made.measured(60)
+    states = made.states_of(arrays)
+    half = [made.message(k, DRIVES[:3], np.ones(3), [], []) for k in range(20)]
     mixed = [state for pair in zip(states, half, strict=False) for state in pair] + states[20:]
-    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
-    assert_same(recording, arrays)
-    assert the_one(recording, 'incomplete_messages').count == 20
+    recording = read_recording(made.write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
+    made.assert_same(recording, arrays)
+    assert made.the_one(recording, 'incomplete_messages').count == 20
 
 
 @pytest.mark.parametrize('offset', [None, 0.02, 0.5])
 def test_two_publishers_on_one_topic_are_no_recording(offset: float | None, tmp_path: Path) -> None:
-    arrays = measured(200)
-    other = measured(200, seed=1)['position'] + offset if offset else np.zeros((200, len(DRIVES)))
-    mixed = [state for pair in zip(states_of(arrays), states_of(
+    arrays = made.measured(200)
+    other = made.measured(200, seed=1)['position'] + offset if offset else np.zeros((200, 6))
+    mixed = [state for pair in zip(made.states_of(arrays), made.states_of(
         arrays, time=arrays['time'] + 0.0007, position=other), strict=True) for state in pair]
     with pytest.raises(UnreadableFileError, match='two nodes publish there'):
-        read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
+        read_recording(made.write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
 
 
 def test_a_message_that_names_a_drive_twice_is_not_used(tmp_path: Path) -> None:
-    arrays = measured(60)
-    double = [message(1, [*DRIVES, DRIVES[0]], np.ones(7), np.ones(7), np.ones(7))] * 20
-    mixed = read_recording(write_plain_bag(
-        tmp_path / 'mixed', {'/joint_states': [*states_of(arrays), *double]}))
-    assert_same(mixed, arrays)
-    assert the_one(mixed, 'incomplete_messages').count == 20
+    arrays = made.measured(60)
+    double = [made.message(1, [*DRIVES, DRIVES[0]], np.ones(7), np.ones(7), np.ones(7))] * 20
+    mixed = read_recording(made.write_plain_bag(
+        tmp_path / 'mixed', {'/joint_states': [*made.states_of(arrays), *double]}))
+    made.assert_same(mixed, arrays)
+    assert made.the_one(mixed, 'incomplete_messages').count == 20
     with pytest.raises(UnreadableFileError, match=f'name {DRIVES[0]} twice'):
-        read_recording(write_plain_bag(tmp_path / 'double', {'/joint_states': double}))
+        read_recording(made.write_plain_bag(tmp_path / 'double', {'/joint_states': double}))
 
 
 def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> None:
-    left, right = measured(50, seed=1), measured(50, seed=2)
-    path = write_plain_bag(tmp_path / 'bag', {
-        '/left/joint_states': states_of(left), '/right/joint_states': states_of(right),
-        '/silent/joint_states': [], '/left/wanted': states_of(left)})
+    left, right = made.measured(50, seed=1), made.measured(50, seed=2)
+    path = made.write_plain_bag(tmp_path / 'bag', {
+        '/left/joint_states': made.states_of(left), '/right/joint_states': made.states_of(right),
+        '/silent/joint_states': [], '/left/wanted': made.states_of(left)})
     with pytest.raises(UnreadableFileError, match='/left/joint_states, /right/joint_st') as told:
         read_recording(path)
     assert 'silent' not in str(told.value)
-    assert_same(read_recording(path, topic='/right/joint_states'), right)
-    assert_same(read_recording(path, topic='left/wanted'), left)
+    made.assert_same(read_recording(path, topic='/right/joint_states'), right)
+    made.assert_same(read_recording(path, topic='left/wanted'), left)
     with pytest.raises(UnreadableFileError, match='no sensor_msgs/JointState on /nowhere'):
         read_recording(path, topic='/nowhere')
     with pytest.raises(UnreadableFileError, match='no messages'):
@@ -244,23 +225,23 @@ def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> N
 
 
 def test_header_stamps_of_0_are_replaced_by_times_of_recording(tmp_path: Path) -> None:
-    arrays = measured(600)
-    states = states_of(arrays, time=np.zeros(600))
-    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
-    assert_same(recording, arrays)
-    assert the(recording, 'receive_times').count == 600
+    arrays = made.measured(600)
+    states = made.states_of(arrays, time=np.zeros(600))
+    recording = read_recording(made.write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
+    made.assert_same(recording, arrays)
+    assert made.the(recording, 'receive_times').count == 600
 
 
 def test_bags_are_not_overwritten_and_files_are_replaced(tmp_path: Path) -> None:
-    first, second = measured(100, seed=1), measured(50, seed=2)
+    first, second = made.measured(100, seed=1), made.measured(50, seed=2)
     for suffix in ('.csv', '.mcap', '.db3'):
         for arrays in (first, second):
-            write_recording(tmp_path / f'x{suffix}', judged(arrays))
-        assert_same(read_recording(tmp_path / f'x{suffix}'), second)
-    write_recording(tmp_path / 'bag', judged(first))
+            write_recording(tmp_path / f'x{suffix}', made.judged(arrays))
+        made.assert_same(read_recording(tmp_path / f'x{suffix}'), second)
+    write_recording(tmp_path / 'bag', made.judged(first))
     with pytest.raises(UnreadableFileError, match='exists already'):
-        write_recording(tmp_path / 'bag', judged(second))
-    assert_same(read_recording(tmp_path / 'bag'), first)
+        write_recording(tmp_path / 'bag', made.judged(second))
+    made.assert_same(read_recording(tmp_path / 'bag'), first)
     assert sorted(file.name for file in tmp_path.iterdir()) == ['bag', 'x.csv', 'x.db3', 'x.mcap']
 
 
@@ -279,37 +260,37 @@ TEXTS: dict[str, Callable[[str], str]] = {
 
 @pytest.mark.parametrize('change', TEXTS.values(), ids=TEXTS)
 def test_csv_dialects_are_read_alike(change: Callable[[str], str], tmp_path: Path) -> None:
-    arrays = measured(40)
+    arrays = made.measured(40)
     arrays['effort'][3:5] = np.nan
     arrays['effort'][7, 5] = np.nan
-    text = change(table(arrays).to_csv(index=False))
+    text = change(made.table(arrays).to_csv(index=False))
     (tmp_path / 'x.csv').write_bytes(text.encode())
-    assert_same(read_recording(tmp_path / 'x.csv'), arrays)
+    made.assert_same(read_recording(tmp_path / 'x.csv'), arrays)
 
 
 def test_other_columns_are_ignored_and_told_even_where_they_hold_words(tmp_path: Path) -> None:
-    arrays = measured(40)
-    columns = table(arrays)
+    arrays = made.measured(40)
+    columns = made.table(arrays)
     columns.insert(0, 'phase', ['up, and "down"'] * 40)
     columns['gripper/position'] = 1.0
     columns.to_csv(tmp_path / 'x.csv')
     recording = read_recording(tmp_path / 'x.csv')
-    assert_same(recording, arrays)
-    finding = the_one(recording, 'ignored_columns')
+    made.assert_same(recording, arrays)
+    finding = made.the_one(recording, 'ignored_columns')
     assert finding.count == 3
     assert all(name in finding.text for name in ('(no name)', 'phase', 'gripper/position'))
 
 
 def test_rows_that_belong_to_other_topics_leave_the_motion_as_it_is(tmp_path: Path) -> None:
     # PlotJuggler writes all series into one table, a row per stamp of any of them.
-    arrays = measured(600)
-    columns = table(arrays)
-    other = pd.DataFrame({'time': arrays['time'] + STEP / 3, 'battery': 1.0})
+    arrays = made.measured(600)
+    columns = made.table(arrays)
+    other = pd.DataFrame({'time': arrays['time'] + made.STEP / 3, 'battery': 1.0})
     pd.concat([columns, other]).sort_values('time').to_csv(tmp_path / 'x.csv', index=False)
     recording = read_recording(tmp_path / 'x.csv')
-    assert_same(recording, arrays)
-    assert the_one(recording, 'non_finite_position').count == 600
-    assert kinds(recording) == {'non_finite_position', 'ignored_columns'}
+    made.assert_same(recording, arrays)
+    assert made.the_one(recording, 'non_finite_position').count == 600
+    assert made.kinds(recording) == {'non_finite_position', 'ignored_columns'}
 
 
 MISTAKES = {
@@ -334,8 +315,8 @@ MISTAKES = {
 def test_mistakes_in_a_csv_are_one_sentence_with_the_place(
     change: Callable[[str], str], words: str, tmp_path: Path,
 ) -> None:
-    arrays = {name: values.round(3) for name, values in measured(40).items()}
-    (tmp_path / 'x.csv').write_text(change(table(arrays).to_csv(index=False)))
+    arrays = {name: values.round(3) for name, values in made.measured(40).items()}
+    (tmp_path / 'x.csv').write_text(change(made.table(arrays).to_csv(index=False)))
     with pytest.raises(UnreadableFileError, match=words) as told:
         read_recording(tmp_path / 'x.csv')
     assert '\n' not in str(told.value)
@@ -347,7 +328,7 @@ def test_mistakes_in_a_csv_are_one_sentence_with_the_place(
 
 def damaged(suffix: str, share: float) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        path = by_own_writer(suffix)(folder, measured(5000))
+        path = made.by_own_writer(suffix)(folder, made.measured(5000))
         path.write_bytes(path.read_bytes()[:int(share * path.stat().st_size)])
         return path
     return make
@@ -361,9 +342,9 @@ def content(name: str, data: bytes) -> Callable[[Path], Path]:
 
 
 def without_joint_states(folder: Path) -> Path:
-    text = STORE.types['std_msgs/msg/String']('hello')
-    return write_plain_bag(folder / 'bag', {'/joint_states': [
-        bytes(STORE.serialize_cdr(text, 'std_msgs/msg/String'))]}, msgtype='std_msgs/msg/String')
+    text = made.STORE.types['std_msgs/msg/String']('hello')
+    return made.write_plain_bag(folder / 'bag', {'/joint_states': [
+        bytes(made.STORE.serialize_cdr(text, text.__msgtype__))]}, msgtype=text.__msgtype__)
 
 
 def empty_folder(folder: Path) -> Path:
@@ -379,8 +360,9 @@ NOISE = random.Random(5).randbytes(4000)
 JPEG = b'\xff\xd8\xff\xe0\x00\x10JFIF\x00\x01' + NOISE
 FOREIGN = {
     'missing': lambda folder: folder / 'nothing.csv',
-    **{f'{kind}{suffix}': content(f'x{suffix}', data) for suffix in ('.csv', '.mcap', '.db3')
-       for kind, data in (('noise', NOISE), ('jpeg', JPEG), ('empty', b''), ('zeros', bytes(999)))},
+    **{f'{kind}{suffix}': content(f'x{suffix}', data) for kind, data in (
+        ('noise', NOISE), ('jpeg', JPEG), ('empty', b''), ('zeros', bytes(999)))
+       for suffix in ('.csv', '.mcap', '.db3', '.npz', '.mat', '.parquet', '.csv.zst')},
     'text': content('x.csv', b'Dear robot,\nhow are you?\n'),
     'UTF-16': content('x.csv', 'time,axis/position\n1,2\n'.encode('utf-16')),
     'noise after rows': content('x.csv', b'time,' + b','.join(
@@ -415,7 +397,7 @@ def test_foreign_and_damaged_files_are_one_sentence(
 def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
     tmp_path: Path, share: float, value: int, suffix: str,
 ) -> None:
-    path = by_own_writer(suffix)(tmp_path, measured(60))
+    path = made.by_own_writer(suffix)(tmp_path, made.measured(60))
     data = bytearray(path.read_bytes())
     data[int(share * (len(data) - 1))] ^= value
     path.write_bytes(data)
@@ -437,10 +419,10 @@ def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
 
 
 def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
-    arrays = measured()
+    arrays = made.measured()
     arrays['time'][500:] += 10
     arrays['effort'][:250, 0] = np.nan
-    summary = describe(judged(arrays))
+    summary = describe(made.judged(arrays))
     assert (summary.samples, summary.used) == (1000, 1000)
     assert (summary.start, summary.end) == (0, pytest.approx(11.998))
     assert summary.duration == pytest.approx(2 * 0.998)
@@ -451,7 +433,7 @@ def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
     assert first.position == (arrays['position'][:, 0].min(), arrays['position'][:, 0].max())
     assert first.effort == (arrays['effort'][250:, 0].min(), arrays['effort'][250:, 0].max())
     assert {finding.kind for finding in summary.findings} == {'gap', 'effort_not_measured'}
-    bare = describe(judged({**arrays, 'velocity': None, 'effort': None}))
+    bare = describe(made.judged({**arrays, 'velocity': None, 'effort': None}))
     assert bare.drives['lift_3'].velocity is None
     assert bare.drives['lift_3'].effort is None
 
@@ -461,7 +443,7 @@ def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
 
 def rows_with(tmp_path: Path, change: Callable[[list[str]], None]) -> Path:
     """Write 4000 rows with a last column of words that nobody asked for, some changed."""
-    lines = table(measured(4000)).assign(note='ok').to_csv(index=False).split('\n')
+    lines = made.table(made.measured(4000)).assign(note='ok').to_csv(index=False).split('\n')
     change(lines)
     (tmp_path / 'x.csv').write_text('\n'.join(lines))
     return tmp_path / 'x.csv'
@@ -492,10 +474,10 @@ def test_words_of_ignored_columns_take_no_row_away(word: str, tmp_path: Path) ->
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('repeats')
-    run = judged(measured())
+    run = made.judged(made.measured())
     for name in ('run.csv', 'copy.csv', 'same.mcap', 'same.db3'):
         write_recording(folder / name, run)
-    write_recording(folder / 'other.csv', judged(measured(seed=1)))
+    write_recording(folder / 'other.csv', made.judged(made.measured(seed=1)))
     return folder
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of
-from node_bench import Bench, bench
+from node_bench import Bench
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from scipy.spatial.transform import Rotation
@@ -127,12 +127,6 @@ def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
         topics = [each.topic_name for each in node.node.publishers]
         assert '/feedforward/commands' in topics
         assert '/feedforward/current' not in topics
-
-
-@pytest.fixture
-def running() -> Iterator[Bench]:
-    with bench() as probe:
-        yield probe
 
 
 def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(

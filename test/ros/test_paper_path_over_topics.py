@@ -6,12 +6,11 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from node_bench import Bench, bench
+from node_bench import Bench
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -23,12 +22,6 @@ pytestmark = pytest.mark.nodes
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 EQUAL = 1e-12
-
-
-@pytest.fixture
-def running() -> Iterator[Bench]:
-    with bench() as probe:
-        yield probe
 
 
 def test_the_papers_path_goes_in_and_its_forces_come_out(

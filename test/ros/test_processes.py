@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -36,12 +35,6 @@ PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 
 
 EQUAL = 1e-12
-
-
-@pytest.fixture
-def running() -> Iterator[Bench]:
-    with bench() as probe:
-        yield probe
 
 
 def play(domain: int, *parameters: str) -> subprocess.CompletedProcess[str]:

@@ -27,9 +27,10 @@ HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
 AXIS = Path(__file__).parents[2] / 'config' / 'single_axis.yaml'
 
 
-def write_axis(path: Path, seed: int, duration: float = 8.0) -> Path:
-    """Write a recording of the single axis with friction that its model lacks."""
-    robot = with_effects(DriveModel.load(AXIS), {'coulomb_friction': {'axis.force': 6.0}})
+def write_axis(path: Path, seed: int, duration: float = 8.0, friction: float = 6.0) -> Path:
+    """Write a recording of the single axis with Coulomb friction that its model lacks [N]."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    robot = with_effects(DriveModel.load(AXIS), {'coulomb_friction': {'axis.force': friction}})
     write_recording(path, axis_recording(robot, seed, 1.0, time=np.arange(0.0, duration, STEP)))
     return path
 
