@@ -17,6 +17,7 @@ from types import CellType, CodeType, FunctionType
 from typing import Any
 
 import numba
+import numpy as np
 
 from pprs_dynamics.physics.mechanism.tree_equations import elements
 
@@ -102,7 +103,8 @@ def _bound(function: FunctionType) -> FunctionType:
             return _compiled(_unchanged)
         if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
             return _compiled(used)
-        return used
+        # Numba compiles a callee again for each Python integer that is a constant.
+        return np.int64(used) if type(used) is int else used
 
     namespace = dict(function.__globals__)
     for name in _names(function.__code__) & namespace.keys():

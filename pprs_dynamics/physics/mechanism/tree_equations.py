@@ -392,6 +392,11 @@ def turned_back(table: Any, j: int, k: int, v: Vector) -> Vector:
     return plus(plus(times(v.x, x), times(v.y, y)), times(v.z, z))
 
 
+def square(x: Any) -> Any:
+    """Return x^2."""
+    return x * x
+
+
 def larger(x: Any, y: Any) -> Any:
     """Return the larger of two numbers; NaN where x is."""
     return y if x < y else x
@@ -540,7 +545,8 @@ def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) ->
 def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     """Close the loops for the drives' positions `goal`, walked from closed coordinates `start`.
 
-    In each stride Newton's method moves the passive coordinates until the loops close.
+    In each stride Newton's method moves the passive coordinates until the loops close. Frames and
+    the loops' Jacobian are those of the last coordinates.
 
     Returns
     -------
@@ -554,24 +560,25 @@ def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     for d in range(len(t.drives)):
         m.q[t.drives[d]] = goal[d]
         need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
-    if not count:
-        return True
-    if not need < MOST_STRIDES:
+    if count and not need < MOST_STRIDES:
         m.solution[OPEN] = need + 1.0
         return False
-    strides = max(1, ceil(need))
+    strides = max(1, ceil(need)) if count else 1
     for k in range(1, strides + 1):
         for d in range(len(t.drives)):
             c = t.drives[d]
             m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
-        for n in range(MOST_STEPS):
-            m.solution[STEPS] = 1.0 + n
+        is_closed = not count
+        for n in range(1 + MOST_STEPS):
             update_frame_placements(t, m)
+            jacobian(t, m, t.places, m.J, m.by_drives)
+            if is_closed or n == MOST_STEPS:
+                break
+            m.solution[STEPS] = 1.0 + n
             size = 0.0
             for r in range(count):
                 m.residuals[r, 0] = residual(t, m, r)
                 size = larger(size, abs(m.residuals[r, 0]))
-            jacobian(t, m, t.places, m.J, m.by_drives)
             solve(m.J, m.residuals)
             step = 0.0
             for r in range(count):
@@ -579,8 +586,7 @@ def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
             share = LONGEST_STEP / larger(step, LONGEST_STEP)
             for r in range(count):
                 m.q[t.passive[r]] -= share * m.residuals[r, 0]
-            if larger(step, size) < CLOSED:
-                break
+            is_closed = larger(step, size) < CLOSED
         if not size < CLOSED:
             break
     m.solution[OPEN] = size
@@ -615,13 +621,13 @@ def is_regular_and_closed(t: Model, m: Data, at_home: Any) -> bool:
 
 
 def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
-    """Fill in all that follows from closed positions, and velocities and accelerations of drives.
+    """Fill in all that follows from `close_loops`, and velocities and accelerations of drives.
 
     Parameters
     ----------
     t : Model
     m : Data
-        With `q`.
+        After `close_loops`.
     v, a : (D,) arrays
     """
     count, drives = len(t.passive), len(t.drives)
@@ -635,27 +641,25 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
         m.v[t.drives[d]] = v[d]
         m.a[t.drives[d]] = a[d]
         T[t.drives[d], d] = 1.0
-    update_frame_placements(t, m)
     m.solution[DETERMINANT] = m.solution[CONDITION] = 0.0
     if count:
-        jacobian(t, m, t.places, m.J, by_drives)
         there = 0.0
         for r in range(count):
             x = 0.0
             for c in range(count):
-                x = x + (m.J[r, c] * t.passive_unit[c]) ** 2
+                x = x + square(m.J[r, c] * t.passive_unit[c])
                 inverse[r, c] = 1.0 if r == c else 0.0
             for d in range(drives):
                 inverse[r, count + d] = by_drives[r, d]
-            there = there + x / t.row_reals[r, UNIT] ** 2
+            there = there + x / square(t.row_reals[r, UNIT])
         m.solution[DETERMINANT] = solve(m.J, inverse)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
         back = 0.0
         for c in range(count):
             x = 0.0
             for r in range(count):
-                x = x + (inverse[c, r] * t.row_reals[r, UNIT]) ** 2
-            back = back + x / t.passive_unit[c] ** 2
+                x = x + square(inverse[c, r] * t.row_reals[r, UNIT])
+            back = back + x / square(t.passive_unit[c])
             for d in range(drives):
                 T[passive[c], d] = -inverse[c, count + d]
         m.solution[CONDITION] = sqrt(there * back)
@@ -665,15 +669,16 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
                 x = x + T[passive[c], d] * v[d]
             m.v[passive[c]] = x
     velocities(t, m)
-    accelerations(t, m)
-    if count:
-        for r in range(count):
-            m.residuals[r, 0] = row_acceleration(t, m, r)
-        for c in range(count):
-            x = 0.0
+    for again in range(2 if count else 1):
+        # First without those of passive coordinates: they undo what the rows accelerate then.
+        if again:
             for r in range(count):
-                x = x + inverse[c, r] * m.residuals[r, 0]
-            m.a[passive[c]] = -x
+                m.residuals[r, 0] = row_acceleration(t, m, r)
+            for c in range(count):
+                x = 0.0
+                for r in range(count):
+                    x = x + inverse[c, r] * m.residuals[r, 0]
+                m.a[passive[c]] = -x
         accelerations(t, m)
 
 
@@ -691,12 +696,12 @@ def predict(t: Model, m: Data, goal: Any, start: Any) -> None:
     start : (C,) array
         Closed coordinates of the sample; overwritten by the extrapolation.
     """
-    T, square, along = m.drive_to_joint, 1e-300, 0.0
+    T, speed, along = m.drive_to_joint, 1e-300, 0.0
     for d in range(len(t.drives)):
         v = m.v[t.drives[d]]
-        square += v * v
+        speed += v * v
         along += v * (goal[d] - start[t.drives[d]])
-    half = 0.5 * (along / square) ** 2
+    half = 0.5 * square(along / speed)
     for p in range(len(t.passive)):
         c = t.passive[p]
         drift, move = m.a[c], 0.0
@@ -748,20 +753,19 @@ def accelerations(t: Model, m: Data) -> None:
         put(links, j, UD, ud)
 
 
-def _point(m: Data, j: int, at: Vector) -> Any:
+def _point(links: Any, j: int, at: Vector) -> Any:
     """Return velocity and acceleration of a link's point at a place."""
-    arm, w = minus(at, vector(m.links, j, P)), vector(m.links, j, W)
+    arm, w = minus(at, vector(links, j, P)), vector(links, j, W)
     v = product(w, arm)
-    return (plus(vector(m.links, j, U), v),
-            plus(plus(vector(m.links, j, UD), product(vector(m.links, j, WD), arm)),
-                 product(w, v)))
+    return (plus(vector(links, j, U), v),
+            plus(plus(vector(links, j, UD), product(vector(links, j, WD), arm)), product(w, v)))
 
 
-def _turning(m: Data, j: int, direction: Vector) -> Any:
+def _turning(links: Any, j: int, direction: Vector) -> Any:
     """Return first and second derivative of a direction fixed in a link."""
-    w = vector(m.links, j, W)
+    w = vector(links, j, W)
     v = product(w, direction)
-    return v, plus(product(vector(m.links, j, WD), direction), product(w, v))
+    return v, plus(product(vector(links, j, WD), direction), product(w, v))
 
 
 def row_acceleration(t: Model, m: Data, r: int) -> Any:
@@ -769,9 +773,9 @@ def row_acceleration(t: Model, m: Data, r: int) -> Any:
     k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
         e, p_a, p_b = column(loops, k, A_R, i), vector(loops, k, A_P), vector(loops, k, B_P)
-        de, dde = _turning(m, t.closures[k, LOOP_A], e)
-        v_a, a_a = _point(m, t.closures[k, LOOP_A], p_a)
-        v_b, a_b = _point(m, t.closures[k, LOOP_B], p_b)
+        de, dde = _turning(m.links, t.closures[k, LOOP_A], e)
+        v_a, a_a = _point(m.links, t.closures[k, LOOP_A], p_a)
+        v_b, a_b = _point(m.links, t.closures[k, LOOP_B], p_b)
         return (dot(e, minus(a_b, a_a)) + 2.0 * dot(de, minus(v_b, v_a))
                 + dot(dde, minus(p_b, p_a)))
     total = t.row_reals[r, 0] * _angle_acceleration(t, m, k, i, t.rows[r, AXES + 1])
@@ -781,8 +785,8 @@ def row_acceleration(t: Model, m: Data, r: int) -> Any:
 
 def _angle_acceleration(t: Model, m: Data, k: int, i: int, j: int) -> Any:
     a, b = column(m.loops, k, A_R, i), column(m.loops, k, B_R, j)
-    da, dda = _turning(m, t.closures[k, LOOP_A], a)
-    db, ddb = _turning(m, t.closures[k, LOOP_B], b)
+    da, dda = _turning(m.links, t.closures[k, LOOP_A], a)
+    db, ddb = _turning(m.links, t.closures[k, LOOP_B], b)
     return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
 
 
@@ -887,8 +891,8 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
                              + efforts[JOINT_EFFORT, d])
 
 
-def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) -> None:
-    """Fill in the drives' efforts (D,) against friction of passive joints, with their loads.
+def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction) -> None:
+    """Fill in the drives' efforts against friction of passive joints, with their loads.
 
     The moment in a closure acts on both of its links: it is felt in the joints between them.
     """
@@ -915,7 +919,7 @@ def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) 
                 if t.joints[i, TURNS]:
                     of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
                         vector(links, i, Z), moment)
-    project_to_actuators(t, m, of_tree, efforts)
+    project_to_actuators(t, m, of_tree, o.efforts)
 
 
 def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
@@ -936,14 +940,14 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
         if stages & MOTION:
             q = given[0, s]
             # First from coordinates of another motion, then from the last sample, then from home.
-            is_closed = False
+            is_closed = is_regular = False
             for trial in range(0 if nearby and s == 0 else 1, 3):
                 if trial > 0 or is_near(t, start, q):
                     is_closed = close_loops(t, m, start, q)
                 if is_closed:
                     forward_kinematics(t, m, given[1, s], given[2, s])
-                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS
-                                     and is_regular_and_closed(t, m, at_home)):
+                    is_regular = is_regular_and_closed(t, m, at_home)
+                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS and is_regular):
                         break
                 is_closed = False
                 for c in range(len(home)):
@@ -954,7 +958,7 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
                 closed[s, c] = start[c] = m.q[c]
             if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
                 predict(t, m, given[0, s + 1], start)
-            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
+            if not (stages & KEPT or is_regular):
                 return s
         if stages & FORCES:
             if not stages & KEPT:
@@ -967,7 +971,9 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
                 own = efforts[:, s]
                 for d in range(given.shape[2]):
                     own[TRANSMITTED, d] = o.efforts[d]
-                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                joint_friction(t, m, o, friction)
+                for d in range(given.shape[2]):
+                    own[JOINT_EFFORT, d] = o.efforts[d]
                 actuator_efforts(actuators, given[1, s], given[2, s], own)
     return -1
 
@@ -981,7 +987,7 @@ def oppose_friction(sizes: Any, integers: Any, reals: Any, motions: Any, links: 
     for s in range(len(efforts)):
         m = elements(read_motion(sizes, motions[s], reals))
         o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
-        joint_friction(t, m, o, friction, efforts[s])
+        joint_friction(t, m, o, friction)
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
