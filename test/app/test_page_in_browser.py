@@ -12,16 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import made_up_diagnosis as made
 import pytest
 from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, needs_browser
-from made_up_diagnosis import (
-    NOISE,
-    calibration,
-    found_effect,
-    made_up_diagnosis,
-    made_up_residuals,
-    ranked_sets,
-)
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.api.adopt import AdoptionResult
@@ -43,24 +36,24 @@ FIRST_PAINT = 500.0  # [ms]
 
 def made_up_pages() -> dict[str, Page]:
     """Return the pages that have nearly all components, by name."""
-    diagnosis = made_up_diagnosis(
-        effects=(found_effect('coulomb_friction', ('lift_2', 'slide_1')),),
-        sets=ranked_sets('coulomb_friction', 'hysteresis'))
+    diagnosis = made.made_up_diagnosis(
+        effects=(made.found_effect('coulomb_friction', ('lift_2', 'slide_1')),),
+        sets=made.ranked_sets('coulomb_friction', 'hysteresis'))
     words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
     return {
-        'diagnosis': diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap']),
+        'diagnosis': diagnosis_page(diagnosis, words, made.made_up_residuals(), ['my run.mcap']),
         'adoption': _adoption(diagnosis.residuals)}
 
 
 def _adoption(before: Residuals) -> Page:
-    model, after = DriveModel.load(), made_up_residuals()
-    friction = found_effect('coulomb_friction').force
+    model, after = DriveModel.load(), made.made_up_residuals()
+    friction = made.found_effect('coulomb_friction').force
     with_it = replace(after, parts={'coulomb_friction': friction})
     return AdoptionResult(Inputs(model, {}, {}), Adoption(
         EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), model, model, before, with_it,
-        0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, NOISE),
+        0.26, 0.052, VALIDATION, dict.fromkeys(DRIVES, made.NOISE),
         {'lift_2.force': Estimate(0.6, 0.01, 'N')},
-        remarks=('the recordings call for time_delay, too',), calibrated=(calibration(),),
+        remarks=('the recordings call for time_delay, too',), calibrated=(made.calibration(),),
         rivals=('load_friction',), reason='the error on held-out data falls')).page()
 
 

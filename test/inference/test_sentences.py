@@ -11,15 +11,8 @@ import shlex
 from dataclasses import replace
 from typing import Any
 
+import made_up_diagnosis as made
 import pytest
-from made_up_diagnosis import (
-    SUSPECT,
-    calibration,
-    found_effect,
-    made_up_diagnosis,
-    made_up_residuals,
-    statement,
-)
 from made_up_recordings import judged, measured
 from rich.console import Console
 
@@ -38,29 +31,29 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 def one_effect(**changes: Any) -> Diagnosis:
-    return made_up_diagnosis(effects=(found_effect('coulomb_friction'),), **changes)
+    return made.made_up_diagnosis(effects=(made.found_effect('coulomb_friction'),), **changes)
 
 
 def ambiguous() -> Diagnosis:
-    return made_up_diagnosis(
-        'ambiguous', effects=(found_effect('base_tilt', None),),
+    return made.made_up_diagnosis(
+        'ambiguous', effects=(made.found_effect('base_tilt', None),),
         indistinguishable=(('base_tilt', 'external_wrench'),))
 
 
 def everything() -> Diagnosis:
     """Return a diagnosis with something in every place, on many drives."""
-    return made_up_diagnosis(
-        'unknown', effects=(found_effect('stribeck_friction', DRIVES),
-                            found_effect('asymmetric_friction', DRIVES[:5]),
-                            found_effect('payload_offset', None)),
-        indistinguishable=(('payload_offset', 'external_wrench'),), depends_on=(statement(),),
-        suspects=(SUSPECT,),
-        calibrated=(calibration(),), warnings=('effort of slide_1 looks filtered',))
+    return made.made_up_diagnosis(
+        'unknown', effects=(made.found_effect('stribeck_friction', DRIVES),
+                            made.found_effect('asymmetric_friction', DRIVES[:5]),
+                            made.found_effect('payload_offset', None)),
+        indistinguishable=(('payload_offset', 'external_wrench'),), depends_on=(made.statement(),),
+        suspects=(made.SUSPECT,),
+        calibrated=(made.calibration(),), warnings=('effort of slide_1 looks filtered',))
 
 
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
-    worse = made_up_diagnosis('adequate', unconfirmed=(
-        found_effect('hysteresis', held_out_after=0.3,
+    worse = made.made_up_diagnosis('adequate', unconfirmed=(
+        made.found_effect('hysteresis', held_out_after=0.3,
                      objection='held-out data are predicted worse with it'),))
     words = word_diagnosis(worse)
     assert 'lacks' not in words.headline
@@ -120,8 +113,8 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
 
 
 def test_an_effect_that_is_not_confirmed_is_named_and_nothing_is_adopted() -> None:
-    refuted = found_effect('hysteresis', objection='held-out data are predicted worse with it')
-    found = made_up_diagnosis('unknown', effects=(found_effect('coulomb_friction'),),
+    refuted = made.found_effect('hysteresis', objection='held-out data are predicted worse with it')
+    found = made.made_up_diagnosis('unknown', effects=(made.found_effect('coulomb_friction'),),
                               unconfirmed=(refuted,))
     assert word_diagnosis(found).headline == (
         'The model lacks coulomb_friction on lift_2. Not confirmed: hysteresis on lift_2 '
@@ -133,8 +126,8 @@ def test_an_effect_that_is_not_confirmed_is_named_and_nothing_is_adopted() -> No
 
 @pytest.mark.parametrize('count', [0, 1, 2])
 def test_an_unexplained_error_is_recorded_again_before_anything_is_adopted(count: int) -> None:
-    effects = (found_effect('coulomb_friction'), found_effect('time_delay'))[:count]
-    open_ = made_up_diagnosis('unknown', effects=effects, above_noise={'lift_2': 3.0})
+    effects = (made.found_effect('coulomb_friction'), made.found_effect('time_delay'))[:count]
+    open_ = made.made_up_diagnosis('unknown', effects=effects, above_noise={'lift_2': 3.0})
     following, command = next_step(open_, GivenFiles(('a.csv',)))
     assert following.startswith('Repeat the motion')
     assert command.startswith('pprs diagnose a.csv SECOND_RECORDING')
@@ -161,9 +154,9 @@ def test_commands_say_whose_robot_the_model_is() -> None:
 
 
 def test_the_page_escapes_what_comes_from_files() -> None:
-    words = word_diagnosis(everything())
-    html = diagnosis_page(everything(), words, made_up_residuals(), ['<script>alert(1)</script>'],
-                          ['<b>']).html()
+    html = diagnosis_page(
+        everything(), word_diagnosis(everything()), made.made_up_residuals(),
+        ['<script>alert(1)</script>'], ['<b>']).html()
     assert '<script>alert(1)' not in html
     assert '&lt;script&gt;alert(1)' in html
     assert 'Held out: &lt;b&gt;' in html
