@@ -168,8 +168,8 @@ def test_what_a_reference_leaves_open_is_no_change(
     assert found.verdict == 'adequate'
 
 
-@pytest.mark.parametrize('exchanged', ['drives', 'positions', 'efforts'])
-@pytest.mark.parametrize('where', ['later', 'before'])
+@pytest.mark.parametrize(('exchanged', 'where'), [
+    ('drives', 'later'), ('positions', 'before'), ('efforts', 'later')])
 def test_exchanged_columns_of_two_joints_are_named_beside_a_reference(
         exchanged: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model, order = arm.real_arm(tmp_path), [1, 0, 2]
