@@ -207,32 +207,35 @@ class CsvTable:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
 
-        numbered = [(number, line) for number, line in enumerate(lines, start)
-                    if line.strip() and line not in self.heads]
+        def rows() -> Iterator[tuple[int, list[str]]]:
+            """Yield the cells of rows with their numbers."""
+            return ((number, self._row(number, line)) for number, line in enumerate(lines, start)
+                    if not line.isspace() and line not in self.heads)
+
+        kept = [line for line in lines if not line.isspace() and line not in self.heads]
+        content = ''.join(kept)
+        counts = {len(line.split()) if self.separator == BLANK else line.count(self.separator) + 1
+                  for line in kept}
         # pandas fills short rows, and takes a quote without its pair for the beginning of a cell.
-        for number, line in numbered:
-            count = (len(line.split()) if self.separator == BLANK else
-                     line.count(self.separator) + 1)
-            if count != self.count or '"' in line:
-                self._row(number, line)
+        if counts - {self.count} or '"' in content:
+            list(rows())  # raises an error for a row that is none
         # From pandas 3.1 on, numbers are always exact and the argument is deprecated.
         exact = ({'float_precision': 'round_trip'}
                  if tuple(map(int, pd.__version__.split('.')[:2])) < (3, 1) else {})
         try:
             frame = pd.read_csv(
-                StringIO(''.join(lines)), header=None, names=range(self.count), usecols=used,
+                StringIO(content), header=None, names=range(self.count), usecols=used,
                 sep=r'\s+' if self.separator == BLANK else self.separator, decimal=self.decimal,
                 skipinitialspace=True, keep_default_na=False, na_values=NO_NUMBERS,
                 dtype={k: str if k in dates else float for k in used}, **exact)
-            if len(frame) == len(numbered):
+            if len(frame) == len(kept):
                 for k in dates:
                     frame[k] = [_seconds_of(date) for date in frame[k].fillna('')]
                 return np.asarray(frame[list(used)], dtype=float)
         except ValueError:
             pass
         return np.array([[self._number(number, cells, column, column in dates) for column in used]
-                         for number, line in numbered for cells in [self._row(number, line)]]
-                        ).reshape(-1, len(used))
+                         for number, cells in rows()]).reshape(-1, len(used))
 
     def _row(self, number: int, line: str) -> list[str]:
         """Return the cells of a row, or raise UnreadableFileError if it is none of this table."""
