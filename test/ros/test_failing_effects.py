@@ -109,8 +109,8 @@ def test_the_monitor_counts_tells_and_goes_on(package: ModuleType) -> None:
         fail(package, 'columns')
         monitor.send(200)
         silent = len(monitor.residual)
-        assert monitor.node._counters['EFFECT'] > 0
-        assert monitor.bench.spin_until(lambda: monitor.bench.status[-1]['code'] == 'EFFECT')
+        assert monitor.says('EFFECT')
+        assert monitor.bench.status[-1]['counters']['EFFECT'] > 0
         assert 'effect worn_brake: columns raised' in monitor.bench.status[-1]['message']
         result, = monitor.node.set_parameters(
             [Parameter('effects.worn_brake.slide_2.coefficient', value=4.0)])
