@@ -9,6 +9,8 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 
 # Side by side, processes with several threads each for linear algebra only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
+# Without compiled modules each of the hundreds of processes of the tests compiles them anew: 0.5 s.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo demo-feedforward test test-nodes test-others test-slow fuzz reproduce feedforward localisation score adoption benchmark \
 	naming reference reliability reliability-full experiments decisions mutants workbench docs lint clean
