@@ -43,7 +43,7 @@ def consult(selection: ModelTable, truth: Mapping[str, Any]) -> dict[str, Any]:
     if not chosen:
         return {}
     own = fits.refined(fits.evaluate((EffectCandidate.of(chosen),)))
-    base = replace(nothing, fit=fits.regression.at((), own.fit.amplitudes))
+    base = replace(nothing, fit=fits.regression.at((), own.fit))
     rivals = [fits.refined(fits.evaluate(proposal)).cost
               for proposal in scan.proposals(base, RIVALS) if proposal[0].name != effect.name]
     return {'best_error': linear_error(fits, own),

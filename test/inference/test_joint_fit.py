@@ -123,7 +123,7 @@ def test_the_gain_of_a_block_is_the_fall_of_the_deviance_at_the_same_noise() -> 
     regression, blocks = made_up(1)
     fit = regression.fit(blocks[:1])
     for block in blocks[1:]:
-        after = regression.at((*blocks[:1], block), fit.amplitudes)
+        after = regression.at((*blocks[:1], block), fit)
         assert regression.gain(fit, block) == pytest.approx(fit.deviance - after.deviance,
                                                             abs=1e-4)
 

@@ -137,7 +137,7 @@ def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | No
                                             + unit / (WIDEST * scale) ** 2)
 
     # The noise is that of a flexible curve, the same for all.
-    noise = regression.fit((block(FLEXIBLE),)).amplitudes
+    noise = regression.fit((block(FLEXIBLE),))
     best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
                key=lambda fit: fit.deviance)
     precision = best.blocks[0].precision

@@ -115,7 +115,7 @@ def _search(residuals: Residuals, drive: int) -> tuple[list[Statement], NoiseSpe
         statements.append(word_statement(drive_patterns, candidate, found.of(
             candidate.parts[drive]), evidence, other_variables))
         blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
-        fit = regression.fit(blocks, found.amplitudes)
+        fit = regression.fit(blocks, found)
     return statements, regression.noise(fit)[drive]
 
 
@@ -136,7 +136,7 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
         if refined.pattern.kind in PLACES and np.mean(
                 refined.rows[drive_patterns.d][0] != 0) > MOST_SHARE:
             continue
-        found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
+        found = regression.fit([*blocks, *refined.blocks], near)
         scored.append((fit.deviance - found.deviance - refined.prior_cost, refined, found))
     scored.sort(key=lambda scored: -scored[0])
     if not scored or scored[0][0] <= 0:

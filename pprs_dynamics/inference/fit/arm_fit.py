@@ -149,8 +149,8 @@ def _with_widths(regression: Regression, width: Array,
             speed = speeds[regression.series[j].index, j]
             tried = {dry_friction(j, v): v for v in np.maximum(width[j] * WIDTHS, 1e-6)
                      if np.mean(speed > TURNED * v) >= LEAST_MOVING}
-            cost = {block: regression.at([*blocks[:j], block, *blocks[j + 1:]], fit.amplitudes
-                                         ).deviance for block in tried}
+            cost = {block: regression.at([*blocks[:j], block, *blocks[j + 1:]], fit).deviance
+                    for block in tried}
             blocks[j] = min(cost, key=cost.__getitem__, default=blocks[j])
             width[j] = tried.get(blocks[j], width[j])
     return regression.at(blocks, _white(regression, fit)), width

@@ -234,14 +234,14 @@ class Regression:
         """Return the normal equations of blocks and the base columns."""
         return NormalEquations(self.columns, self.base_index, blocks, self.equations)
 
-    def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
+    def fit(self, blocks: Sequence[Block], start: JointFit | Array | None = None) -> JointFit:
         """Return the fit of blocks with the base columns and the noise.
 
         Parameters
         ----------
         blocks : sequence of Block
-        start : (D, J + 1) array, optional
-            Amplitudes of the noise to start from.
+        start : JointFit or (D, J + 1) array, optional
+            A fit or the amplitudes of the noise to start from.
         """
         system, shapes = self.system(blocks), self.noise_shapes
         found = self._solved(system, blocks, shapes.start(np.stack([
@@ -260,13 +260,14 @@ class Regression:
             last = change
         return found
 
-    def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
-        """Return the fit of blocks under given noise."""
-        return self._solved(self.system(blocks), blocks, amplitudes)
+    def at(self, blocks: Sequence[Block], noise: JointFit | Array) -> JointFit:
+        """Return the fit of blocks under the noise of another fit, or of given amplitudes."""
+        return self._solved(self.system(blocks), blocks, noise)
 
-    def _solved(self, system: NormalEquations, blocks: Sequence[Block], amplitudes: Array,
+    def _solved(self, system: NormalEquations, blocks: Sequence[Block], noise: JointFit | Array,
                 ) -> JointFit:
-        spectra = self.noise_shapes.spectra(amplitudes)
+        amplitudes, spectra = (noise.amplitudes, noise.spectra) if isinstance(
+            noise, JointFit) else (noise, self.noise_shapes.spectra(noise))
         return JointFit(**vars(system.solve(spectra, self.counts)), blocks=tuple(blocks),
                         amplitudes=amplitudes, spectra=spectra, places=system.places)
 
@@ -275,7 +276,7 @@ class Regression:
 
         See `NormalEquations.uncertainty`.
         """
-        found = self.at((*fit.blocks, *blocks), fit.amplitudes) if blocks else fit
+        found = self.at((*fit.blocks, *blocks), fit) if blocks else fit
         return replace(found, covariance=self.system(found.blocks).uncertainty(found.spectra))
 
     def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:

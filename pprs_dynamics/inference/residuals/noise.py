@@ -118,7 +118,7 @@ class NoiseShapes:
         found, deviance = white, np.full(white.shape, np.inf)
         for _ in range(DESCRIBED):
             spectrum = white[..., None] + grown[..., None] * slow
-            after = (counts * (np.log(spectrum) + seen / spectrum)).sum(axis=-1)
+            after = (np.log(spectrum) + seen / spectrum) @ counts
             is_better = after < deviance
             deviance = np.where(is_better, after, deviance)
             found = np.where(is_better, white + grown * of_constant, found)
@@ -259,7 +259,8 @@ def _along_median(power: Array) -> Array:
     last = min(2 ** SLOPE_OCTAVES, len(numbers))
     if len(single) < LEAST_PEERS or last == 1:
         return np.zeros(len(single))
-    slope = float(np.median(np.log(single[:, 0] / single[:, last - 1]))) / np.log(last)
+    slopes = np.sort(np.log(single[:, 0] / single[:, last - 1])) / np.log(last)
+    slope = (slopes[len(slopes) // 2] + slopes[(len(slopes) - 1) // 2]) / 2  # the median
     found: Array = single.mean(axis=1) / np.mean(
         numbers ** -slope) * 2.0 ** (CONTINUED_OCTAVES * slope)
     return found

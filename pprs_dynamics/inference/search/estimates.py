@@ -215,7 +215,7 @@ def _determined_on_other_drives(fits: FittedSets, fitted: CandidateSet, candidat
     blocks = [fits.components.block(placed(fits.design, effect, d, {}, names))
               for d in fits.regression.drives
               if d not in drives and fits.design.acts_on(effect, d)]
-    fit = fits.regression.at((*fitted.fit.blocks, *blocks), fitted.fit.amplitudes)
+    fit = fits.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
     return [block for block in blocks if np.all(
         np.diag(fit.covariance[fit.places[block], fit.places[block]])
         < DETERMINED * np.diag(np.linalg.inv(block.precision)))]

@@ -137,7 +137,7 @@ class FittedSets:
         if not candidates:
             fit = self.regression.fit(())
             return CandidateSet((), fit, self._terms(fit))
-        start = self.evaluate(()).fit.amplitudes
+        start = self.evaluate(()).fit
         nuisance: Nuisance = {}
         if any(self.components.leaves_open(component) for c in candidates
                for component in c.components):
@@ -219,7 +219,7 @@ class FittedSets:
         kept = {component for c in candidates for component in c.components}
         nuisance = {component: blocks for component, blocks in fitted.nuisance.items()
                     if component in kept}
-        fit = self.regression.at(self.blocks(candidates, nuisance), fitted.fit.amplitudes)
+        fit = self.regression.at(self.blocks(candidates, nuisance), fitted.fit)
         return self._set(candidates, fit, nuisance)
 
     def prior_cost(self, fitted: CandidateSet) -> CostTerms:
@@ -256,7 +256,7 @@ class FittedSets:
     def free(self, fitted: CandidateSet) -> JointFit:
         """Return the fit of a set without constraints, at its noise."""
         return (fitted.fit if fitted.terms.feasibility == 0
-                else self.regression.at(fitted.fit.blocks, fitted.fit.amplitudes))
+                else self.regression.at(fitted.fit.blocks, fitted.fit))
 
     def refused(self, fitted: CandidateSet) -> list[Component]:
         """Return the components that no machine has in the values that fit best."""
@@ -296,8 +296,7 @@ class FittedSets:
                 moved[component] = replace(component, centre=centre)
         if not slopes and not moved:
             return None
-        fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)),
-                                 fitted.fit.amplitudes)
+        fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)), fitted.fit)
         if not moved and _gain(fit, [block for _, block in slopes]) < LEAST_IMPROVEMENT:
             return None
         for component, block in slopes:

@@ -51,7 +51,7 @@ def noise_floors(fits: FittedSets, period: float | None = None,
         Of a set of effects, whose noise the largest fit must determine as well.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
+    fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit)
     # Degrees of freedom that the columns leave, and the shares of both noises that lie there.
     free = np.maximum(regression.counts - regression.system(fit.blocks).leverage(
         fit.covariance, fit.spectra), 0.0)
