@@ -272,6 +272,11 @@ def test_an_effort_that_stands_still_while_its_drive_moves_is_told() -> None:
     arrays['position'][200:600, 3] = arrays['position'][200, 3]
     arrays['position'][600:, 3] += arrays['position'][599, 3] - arrays['position'][600, 3]
     assert made.judged(arrays).findings == ()
+    # A drive without a sensor has none all the time.
+    arrays = made.measured()
+    arrays['effort'][:, 5] = 0.0
+    assert made.the(made.judged(arrays), 'unmeasured_effort').drives == ('lift_3',)
+    assert np.isnan(made.judged(arrays).effort[:, 5]).all()
 
 
 @pytest.mark.parametrize('quantity', ['position', 'effort'])

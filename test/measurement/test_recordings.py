@@ -86,7 +86,7 @@ def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
 
 @settings(max_examples=40,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60),
+@given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60, unique=True),
        steps=st.floats(1e-4, 0.3))
 def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float) -> None:
     time = 0.1 + steps * np.arange(len(values))

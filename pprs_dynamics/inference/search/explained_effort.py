@@ -86,7 +86,7 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
         else:
             is_little = share < decisions.explained * _beyond_noise(effort, noise.get(name, 0.0))
         if is_little:
-            little[name] = share
+            little[name] = float(np.nan_to_num(share))  # of a constant nothing is explained
     return dict(sorted(little.items(), key=lambda item: item[1]))
 
 

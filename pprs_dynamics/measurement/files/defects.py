@@ -215,6 +215,7 @@ class Judgement:
             self._tell('no_effort', len(effort), 'there is no effort of any drive')
         else:
             self._tell_missing('effort_not_measured', effort, 'effort')
+            self._leave_out_unmeasured()
             effort[~self._first_of_held('effort', effort)] = np.nan
             self._leave_out_zeros()
             self._leave_out_saturated()
@@ -224,6 +225,16 @@ class Judgement:
             return
         velocity[np.isinf(velocity)] = np.nan
         self._tell_missing('missing_velocity', velocity, 'velocity')
+
+    def _leave_out_unmeasured(self) -> None:
+        """Take out efforts that are 0 throughout a motion: no sensor measures them."""
+        position, effort = self.samples.position, self.samples.effort
+        for drive, name in enumerate(self.samples.drives):
+            if signals.is_constant(effort[:, drive]) and not np.nanmax(
+                    np.abs(effort[:, drive])) and not signals.is_constant(position[:, drive]):
+                self._tell('unmeasured_effort', 1,
+                           f'the effort of {name} is 0 throughout, while it moves', drives=[name])
+                effort[:, drive] = np.nan
 
     def _leave_out_zeros(self) -> None:
         """Take out single zeros amid other efforts: an answer that did not come."""

@@ -62,6 +62,7 @@ POLICY = {
     'impossible_effort': 'they count as not measured',
     'held_position': 'each is used once',
     'held_effort': 'each is used once',
+    'unmeasured_effort': 'it counts as not measured',
     'effort_zero': 'they count as not measured',
     'saturated_effort': 'they are left out of every comparison and fit',
     'mostly_saturated': 'too few efforts remain to judge this drive, and none of it is used',
