@@ -5,8 +5,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -25,3 +28,11 @@ def test_an_offset_that_begins_is_no_slow_noise_and_no_pattern_of_time(since: fl
     effect, = found.effects
     assert (effect.name, effect.drives) == ('effort_offset', ('lift_1',))
     assert found.to_dict()['effects'][0]['since'] == pytest.approx(since, abs=0.02)
+
+
+def test_an_offset_that_begins_is_no_friction_with_more_coefficients() -> None:
+    """The scan of onsets finds other effects first, and their times."""
+    run = axis_recording(axis(), seed=4)
+    late = replace(run, effort=run.effort + 6.0 * (run.time > 5.5)[:, None])
+    effect, = diagnose(axis(), [late]).effects
+    assert (effect.name, effect.when) == ('effort_offset', ' since 5.5 s')

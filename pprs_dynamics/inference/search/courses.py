@@ -70,19 +70,18 @@ def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[Candid
         since a nonlinear constant effect may imitate an onset around its own model.
     """
     others = [(fitted, fitted.effects[0]) for fitted in alone if _is_new(fitted.effects[0])]
-    drives = _changing_drives(fits, reported, others)
-    if drives:
-        _fit(fits, reported, others, drives)
-        if first is not None:
-            plain = first.evaluate(tuple(
-                candidate for candidate in reported.effects if not candidate.effect.nonlinear))
-            _fit(first, plain, others, _changing_drives(first, plain, others))
+    if _fit(fits, reported, others) and first is not None:
+        _fit(first, first.evaluate(tuple(
+            candidate for candidate in reported.effects if not candidate.effect.nonlinear)), others)
 
 
-def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int]) -> None:
-    """Fit sets with onsets from a set without, as long as the cost falls."""
+def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
+    """Fit sets with onsets from a set without, as long as the cost falls.
+
+    Return whether something changes.
+    """
+    drives, hidden = _changing_drives(fits, reported, alone)
     best, alone = reported, [*alone, *_alone_on_drives(fits, drives)]
-    likely = {candidate.effect: candidate for candidate in reported.effects if _is_new(candidate)}
     for _ in range(MOST_COURSES if drives else 0):
         constant = [(best, candidate) for candidate in best.effects
                     if not candidate.course and _is_new(candidate)]
@@ -90,7 +89,6 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
         plain = fits.at_noise_of(best, best.effects) if best.unknowns else best
         offers = sorted(_offers(fits, _bases(fits, plain), [*constant, *alone], _courses(fits)),
                         key=lambda offer: -offer.gain)
-        likely |= {offer.candidate.effect: offer.candidate for offer in _best_of_each(offers)}
         # Its shape was that of an effect that is there all the time. Times that are samples off
         # cost more than a pattern of no catalogue, which needs none.
         tried = sorted((fits.refined(_refined(fits, fits.evaluate((*rest, offer.candidate))))
@@ -101,13 +99,24 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
         best = found
+    best = min(best, hidden, key=lambda fitted: fitted.cost)
     if best is not reported:
-        for fitted in _of_one_cause(fits, best, likely.values()):
+        # With the times known, an effect may suffice that was not the likeliest without them.
+        changing = {d for candidate in best.effects if candidate.course
+                    for d in candidate.drives or ()}
+        effects = (*filter(_is_new, reported.effects), *(candidate for _, candidate in alone))
+        for fitted in _of_one_cause(fits, best, (
+                each for each in effects if not changing.isdisjoint(each.drives or changing))):
             fits.pruned(fits.evaluate(_refined(fits, fitted).candidates))
+    return bool(drives)
 
 
-def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:
-    """Return drives on which something may begin, end or grow, or that show a pattern."""
+def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone,
+                     ) -> tuple[set[int], CandidateSet]:
+    """Return drives on which something may begin, end or grow, or that show a pattern.
+
+    Also the reported set, or one with an effect that begins and that slow noise hid from it.
+    """
     def pays(offer: _Offer) -> bool:
         assert offer.candidate.course is not None
         return offer.gain > fits.prior_costs.of_course(offer.candidate.course)
@@ -122,11 +131,15 @@ def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> 
     likely = sorted(filter(pays, _offers(fits, [(fast, 0.0)], [
         pair for pair in alone if pair[1].name in shown], _courses(fits))),
                     key=lambda offer: -offer.gain)[:SLOW_TRIALS]
-    begun = [offer for offer in begun if pays(offer)] + [
-        offer for offer in likely if _refined(fits, fits.evaluate(
-            (*reported.candidates, offer.candidate))).total < reported.total]
-    return {d for unknown in reported.unknowns for d in unknown.drives} | {
-        d for offer in begun for d in offer.drives}
+    drives = {d for unknown in reported.unknowns for d in unknown.drives} | {
+        d for offer in begun if pays(offer) for d in offer.drives}
+    hidden = reported
+    for offer in likely:
+        fitted = fits.pruned(
+            _refined(fits, fits.evaluate((*reported.candidates, offer.candidate))))
+        if fitted.cost < hidden.cost:
+            drives, hidden = drives | offer.drives, fitted
+    return drives, hidden
 
 
 def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
@@ -276,7 +289,7 @@ def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
                     if total < best:
                         best, course = total, tried
         fitted = min(fitted, fits.evaluate((*rest, _with_course(candidate, course))),
-                     key=lambda fitted: fitted.cost)
+                     key=lambda fitted: fitted.total)
     return fitted
 
 
