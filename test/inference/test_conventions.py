@@ -222,6 +222,7 @@ def read_as_told(model: DriveModel, folder: Path, run: Recording,
 
 ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     'degrees': ({'motion': [180 / np.pi, 180 / np.pi, 1.0]}, 'turn: {position_scale: 0.01745329}'),
+    'degrees of one': ({'motion': [1.0, 180 / np.pi, 1.0]}, 'swing: {position_scale: 0.01745329}'),
     'millimetres': ({'motion': [1.0, 1.0, 1e3]}, 'reach: {position_scale: 0.001}'),
     'sign': ({'effort': -1.0}, 'swing: {effort_scale: -1}'),
     'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {effort_scale: -1}')}

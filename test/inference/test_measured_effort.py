@@ -10,7 +10,7 @@ error of position, a measurement without weight; the truth is known by how they 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +18,21 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 from shared_cases import shared_case
-from single_axis import axis, axis_motion
+from single_axis import axis, axis_motion, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.readings.efforts import (
     effort_contents,
     find_no_measurements,
     kinds_of,
     looks_like,
 )
+from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
@@ -177,6 +179,15 @@ def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
     assert found.verdict == 'unknown'
     assert found.effects == found.suspects == found.depends_on == ()
     assert found.to_dict()['effort_looks_like'] == WITHOUT_GRAVITY
+
+
+def test_forces_of_other_drives_are_no_effect_whatever_explains_them() -> None:
+    real = axis({'coulomb_friction': {'force': 4.0}})
+    order = OtherReading('drive_order', 1, 'the drives look recorded in another order')
+    found = diagnose(axis(), [replace(axis_recording(real), findings=(order,))], as_it_is=True)
+    assert found.verdict == 'unknown'
+    assert [effect.name for effect in found.effects] == ['coulomb_friction']
+    assert word_diagnosis(found).headline.startswith('The drives look recorded in another order. ')
 
 
 def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:

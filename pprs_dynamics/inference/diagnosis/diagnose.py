@@ -76,7 +76,10 @@ def diagnose(
     since = None if reference is None else SinceReference.of(reference, table.first.design)
     found = replace(answer_of(table, validate), since=since)
     report(1.0)
-    return found
+    orders = dict.fromkeys(finding.what for recording in recordings
+                           for finding in recording.findings if finding.kind == 'drive_order')
+    # Effects that explain the forces of other drives are none.
+    return replace(found, verdict='unknown', other_order='; '.join(orders)) if orders else found
 
 
 @outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '

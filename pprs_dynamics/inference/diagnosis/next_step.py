@@ -144,7 +144,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a faster motion, without stick-slip, and diagnose it. If the machine must '
                 'move so slowly, remove the cause first (grease, gains, a soft transmission)',
                 other)
-    if diagnosis.little or (
+    if diagnosis.other_order or diagnosis.little or (
             not is_change and _has_no_friction(diagnosis.model)
             and (diagnosis.verdict == 'unknown' or len(effects) > 1)):
         # Several effects of a model without any friction are at best a common fit.

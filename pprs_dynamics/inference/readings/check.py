@@ -116,8 +116,10 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     mistakes: list[Defect] = [*each_of[0]] if likely else []
     if len(likely) > 1:
         has_columns = model.recorded.columns is not None
+        kinds = {mistake.kind for each in each_of for mistake in each}
+        kind = 'drive_order' if kinds == {'drive_order'} else 'ambiguous'
         mistakes = [OtherReading.of(
-            'ambiguous', model.drives, range(len(model.drives)), ', or '.join(
+            kind, model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in each) or PLAIN for each in each_of),
             ' or '.join(filter(None, (line for each in each_of for line in (
                 columns_line(each, has_columns), *(mistake.line for mistake in each))))))]

@@ -306,8 +306,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     for names, turns in ((LENGTHS, False), (angles, True)):
         alike = tuple(k for k in every if units[k].turns == turns)
         for unit, name in names.items():
-            # Encoders of a robot's turning joints count alike; its rails may not.
-            for group in _groups(drives, alike)[:1 if turns else None]:
+            # Encoders of a robot's turning joints count alike.
+            for group in _groups(drives, alike)[:1 if unit in COUNTS else None]:
                 scale, few = np.where(np.isin(same, group), unit, 1.0), FEW * (
                     len(group) < len(alike))
                 few += RARE * (unit == MICROMETRE)
