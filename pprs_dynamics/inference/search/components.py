@@ -109,6 +109,8 @@ class DriveComponents:
 
     def rows_of(self, effect: type[DriveEffect]) -> Array:
         """Return the transformed columns of an effect in all shapes tried, (k, n)."""
+        if 'score_test' not in vars(self):  # which has variants and products as well
+            return self._tried(effect)[1]
         return self.score_test.rows[self.d][self._places[effect]]
 
     def _tried(self, effect: type[DriveEffect]) -> tuple[list[tuple[Term, int, int]], Array]:
