@@ -7,19 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import random_states as states
 from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
 from oracles.first_principles import UP, central_difference, chain_vectors, drive_motion, moved
-from random_states import (
-    ELBOWS,
-    OPEN_LIMITS,
-    home_position,
-    model_of,
-    paper_model,
-    random_motion,
-    random_robot,
-    smooth_motion,
-)
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import MotionError, PprsError, SingularityError
@@ -35,19 +26,19 @@ INDEPENDENT = {'friction.approach': 'independent_chains'}
 HARD_SIGN = {'friction.reversal_velocity': 1e-9, 'friction.reversal_rate': 1e-9}
 STATES = 300
 
-every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+every_elbow = pytest.mark.parametrize('elbow', states.ELBOWS)
 
 
-@pytest.fixture(params=ELBOWS)
+@pytest.fixture(params=states.ELBOWS)
 def robot(request):
     """Return a robot in which no two chains are equal, under oblique gravity."""
-    return random_robot(np.random.default_rng(51), request.param, OBLIQUE)
+    return states.random_robot(np.random.default_rng(51), request.param, OBLIQUE)
 
 
 @pytest.fixture
 def motion(robot):
     """Random states of that robot."""
-    return random_motion(np.random.default_rng(52), STATES, robot.geometry.elbow)
+    return states.random_motion(np.random.default_rng(52), STATES, robot.geometry.elbow)
 
 
 def loads_of_joints(robot, forces):
@@ -65,7 +56,7 @@ def reactions_on_platform(robot, forces):
 # Reactions -----------------------------------------------------------------------------------
 
 def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
-    forces = model_of(robot).drive_forces(motion)
+    forces = states.model_of(robot).drive_forces(motion)
     chains, body = forces.mechanism.links, forces.mechanism.reactions
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
         robot.geometry.rod_length  # noqa: E741
@@ -98,7 +89,7 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
 
 
 def test_a_state_with_one_drive_that_accelerates_more_is_that_of_such_a_motion(robot, motion):
-    model = model_of(robot, NUMBERS)
+    model = states.model_of(robot, NUMBERS)
     state = model.mechanism(motion)
     changed = state.accelerated(2, 0.7)
     expected = state.acceleration + 0.7 * (np.arange(6) == 2)
@@ -113,7 +104,7 @@ def test_a_state_with_one_drive_that_accelerates_more_is_that_of_such_a_motion(r
 
 def test_active_friction_is_viscous_plus_load_times_sign(robot, motion):
     viscous, coulomb = np.linspace(0.5, 3, 6), np.linspace(0.02, 0.2, 6)
-    model = model_of(robot, {**HARD_SIGN, 'friction.drives.viscous': tuple(viscous),
+    model = states.model_of(robot, {**HARD_SIGN, 'friction.drives.viscous': tuple(viscous),
                              'friction.drives.coulomb': tuple(coulomb)})
     forces = model.drive_forces(motion)
     q_dot = drive_motion(robot.geometry, motion)[1]
@@ -148,7 +139,7 @@ NUMBERS = {'friction.revolute.viscous': 0.03, 'friction.revolute.coulomb': 0.4,
 
 
 def test_passive_friction_does_the_joints_virtual_work_for_every_drive(robot, motion):
-    model = model_of(robot, {**HARD_SIGN, **NUMBERS})
+    model = states.model_of(robot, {**HARD_SIGN, **NUMBERS})
     forces = model.drive_forces(motion)
     at_C, at_A, *_ = joint_friction(robot, motion, forces, *NUMBERS.values())
     _, n = chain_vectors(robot.geometry)
@@ -173,9 +164,9 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
     zero = np.zeros_like(motion.position)
     starting = PlatformMotion(motion.position, motion.orientation, zero, zero,
                               motion.linear_acceleration, motion.angular_acceleration)
-    cos_u = model_of(robot).mechanism(starting).links.cos_u
+    cos_u = states.model_of(robot).mechanism(starting).links.cos_u
     starting = starting[np.all(np.abs(cos_u) > 0.06, axis=1)]
-    forces = model_of(robot, changes).drive_forces(starting)
+    forces = states.model_of(robot, changes).drive_forces(starting)
     for part in ('active_friction', 'passive_friction'):
         assert not np.any(forces.parts[part]), part
     assert_array_equal(forces.total, forces.parts['rigid_body'])
@@ -185,10 +176,10 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
 
 
 def test_independent_chains_do_each_chains_virtual_work(robot, motion):
-    cos_u = model_of(robot).mechanism(motion).links.cos_u
+    cos_u = states.model_of(robot).mechanism(motion).links.cos_u
     defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
     changes = {**INDEPENDENT, **HARD_SIGN, **NUMBERS}
-    forces = model_of(robot, changes).drive_forces(defined)
+    forces = states.model_of(robot, changes).drive_forces(defined)
     at_C, at_A, *_ = joint_friction(robot, defined, forces, *NUMBERS.values())
     _, n = chain_vectors(robot.geometry)
     lever = robot.geometry.rod_length * forces.mechanism.links.cos_u
@@ -204,9 +195,10 @@ def test_independent_chains_do_each_chains_virtual_work(robot, motion):
     (-0.0501, False), (-0.0499, True), (0.0499, True)])
 def test_independent_chains_refuse_where_a_rod_is_upright(elbow, equations, cosine, refused):
     # Chain 1 has cos u = (R - r - x) / l.
-    model = paper_model({'geometry.elbow': elbow, **INDEPENDENT, 'equations': equations})
+    model = states.paper_model({'geometry.elbow': elbow, **INDEPENDENT, 'equations': equations})
     x = 0.15 - 0.10 - 0.30 * cosine
-    pose = PlatformMotion.at_rest([home_position(elbow), home_position(elbow) + x * np.eye(3)[0]])
+    home = states.home_position(elbow)
+    pose = PlatformMotion.at_rest([home, home + x * np.eye(3)[0]])
     if not refused:
         assert np.all(np.isfinite(model.drive_forces(pose).total))
         return
@@ -214,7 +206,7 @@ def test_independent_chains_refuse_where_a_rod_is_upright(elbow, equations, cosi
         model.drive_forces(pose)
     assert caught.value.sample == 1
     assert '0.05' in str(caught.value)
-    whole = paper_model({'geometry.elbow': elbow, 'equations': equations})
+    whole = states.paper_model({'geometry.elbow': elbow, 'equations': equations})
     assert np.all(np.isfinite(whole.drive_forces(pose).total))
 
 
@@ -225,10 +217,10 @@ def test_independent_chains_refuse_where_a_rod_is_upright(elbow, equations, cosi
 @pytest.fixture
 def remembering():
     """Return a model with hysteresis, and a motion with reversals."""
-    model = with_effects(paper_model(OPEN_LIMITS), {'hysteresis': {
+    model = with_effects(states.paper_model(states.OPEN_LIMITS), {'hysteresis': {
         f'{drive}.{key}': value for drive in ('slide_1', 'lift_2')
         for key, value in (('force', 0.8), ('distance', 0.01))}})
-    return model, smooth_motion(np.linspace(0, 4, 800))
+    return model, states.smooth_motion(np.linspace(0, 4, 800))
 
 
 def test_a_copied_state_does_not_advance_the_original(remembering):
@@ -243,7 +235,7 @@ def test_a_copied_state_does_not_advance_the_original(remembering):
 def test_state_of_another_model_is_refused(remembering):
     model, motion = remembering
     with pytest.raises(PprsError, match='hysteresis'):
-        model.drive_forces(motion, state=paper_model(OPEN_LIMITS).initial_state())
+        model.drive_forces(motion, state=states.paper_model(states.OPEN_LIMITS).initial_state())
 
 
 @pytest.mark.parametrize(('file', 'motion', 'rule'), [

@@ -9,17 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import random_states as states
 from numpy.testing import assert_allclose
 from oracles.first_principles import chain_vectors, closure
-from random_states import (
-    ELBOWS,
-    home_position,
-    inverse_kinematics,
-    paper_geometry,
-    paper_model,
-    random_poses,
-    random_robot,
-)
 from scipy.optimize import brentq, root
 from scipy.spatial.transform import Rotation
 
@@ -31,13 +23,13 @@ POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
 POSE_TOLERANCE = 1e-11
 
-every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+every_elbow = pytest.mark.parametrize('elbow', states.ELBOWS)
 
 
-@pytest.fixture(params=ELBOWS)
+@pytest.fixture(params=states.ELBOWS)
 def geometry(request):
     """Return a geometry in which no two chains are equal."""
-    return random_robot(np.random.default_rng(21), request.param).geometry
+    return states.random_robot(np.random.default_rng(21), request.param).geometry
 
 
 def home_pose():
@@ -47,12 +39,12 @@ def home_pose():
 
 def forward(geometry, q):
     """Return poses of drive positions."""
-    return replace(paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
+    return replace(states.paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
 
 
 def solve(geometry, motion):
     """Return chains and [B] of a motion."""
-    found = inverse_kinematics(geometry, motion)
+    found = states.inverse_kinematics(geometry, motion)
     A = np.concatenate((np.ones_like(found.sin_u), found.sin_u), axis=1)
     return found, A[:, :, None] * np.linalg.inv(found.J)
 
@@ -67,11 +59,11 @@ def home_determinant(geometry):
 @every_elbow
 @pytest.mark.parametrize('robot', ['paper', 'unequal'])
 def test_forward_kinematics_undoes_inverse_kinematics(elbow, robot):
-    geometry = (paper_geometry(elbow) if robot == 'paper'
-                else random_robot(np.random.default_rng(3), elbow).geometry)
-    position, orientation = random_poses(np.random.default_rng(4), POSES, elbow)
+    geometry = (states.paper_geometry(elbow) if robot == 'paper'
+                else states.random_robot(np.random.default_rng(3), elbow).geometry)
+    position, orientation = states.random_poses(np.random.default_rng(4), POSES, elbow)
     poses = PlatformMotion.at_rest(position, orientation)
-    found = forward(geometry, inverse_kinematics(geometry, poses).position)
+    found = forward(geometry, states.inverse_kinematics(geometry, poses).position)
     assert_allclose(found.position, position, rtol=0, atol=POSE_TOLERANCE)
     assert_allclose(found.rotation, poses.rotation, rtol=0, atol=POSE_TOLERANCE)
 
@@ -88,11 +80,11 @@ def assert_right_or_refused(geometry, q, true_position):
 
 
 def test_other_solutions_of_random_poses_are_refused():
-    geometry = paper_geometry()
+    geometry = states.paper_geometry()
     rng = np.random.default_rng(8)
-    position, orientation = random_poses(rng, 20)
+    position, orientation = states.random_poses(rng, 20)
     true = PlatformMotion.at_rest(position, orientation)
-    q = inverse_kinematics(geometry, true).position
+    q = states.inverse_kinematics(geometry, true).position
     sign_at_home = np.sign(home_determinant(geometry))
     others = 0
     for sample in range(len(q)):
@@ -114,7 +106,7 @@ def test_other_solutions_of_random_poses_are_refused():
 
 
 def test_drives_that_cannot_close_the_mechanism_raise(geometry):
-    q = inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
+    q = states.inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
     q[1, 0] += 1.0  # one slide a metre away from the others
     with pytest.raises(ConvergenceError, match='sample 1') as caught:
         forward(geometry, q)
@@ -126,14 +118,14 @@ def test_drives_that_cannot_close_the_mechanism_raise(geometry):
     ids=['five', 'none', 'nan', 'ragged', 'words'])
 def test_drive_positions_that_are_none_raise(q):
     with pytest.raises(MotionError, match='drive positions'):
-        paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
+        states.paper_model().robot.motion_of_drives(q, np.zeros((1, 6)), np.zeros((1, 6)))
 
 
 def yaw_with_share(geometry, share):
     """Return the home pose yawed until det [B] is `share` of its value at home."""
     def pose(yaw):
         return PlatformMotion.at_rest(
-            home_position(geometry.elbow), Rotation.from_rotvec((0, 0, yaw)).as_quat()[None])
+            states.home_position(geometry.elbow), Rotation.from_rotvec((0, 0, yaw)).as_quat()[None])
 
     def excess(yaw):
         determinant = np.linalg.det(solve(geometry, pose(yaw))[1])[0]
@@ -145,9 +137,9 @@ def yaw_with_share(geometry, share):
 @every_elbow
 @pytest.mark.parametrize('share', [0.5, 0.12, 0.08, 0.01])
 def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
-    geometry = paper_geometry(elbow)
+    geometry = states.paper_geometry(elbow)
     pose = yaw_with_share(geometry, share)
-    q = inverse_kinematics(geometry, pose).position
+    q = states.inverse_kinematics(geometry, pose).position
     found = forward(geometry, q)
     assert_allclose(found.position, pose.position, rtol=0, atol=1e-9)
 
@@ -157,9 +149,10 @@ def test_the_pose_is_found_where_two_solutions_are_about_to_meet(elbow, share):
 @every_elbow
 @pytest.mark.parametrize('chain', [1, 2, 3])
 def test_pose_out_of_reach_names_sample_chain_and_rod_length(elbow, chain):
-    model = paper_model({'geometry.elbow': elbow})
+    model = states.paper_model({'geometry.elbow': elbow})
     away = -0.26 * chain_vectors(model.robot.geometry)[0][chain - 1]  # from this carriage
-    motion = PlatformMotion.at_rest([home_position(elbow), home_position(elbow) + away])
+    home = states.home_position(elbow)
+    motion = PlatformMotion.at_rest([home, home + away])
     with pytest.raises(WorkspaceError, match=rf'chain {chain}\b') as caught:
         model.drive_forces(motion)
     assert not isinstance(caught.value, SingularityError)
@@ -172,22 +165,22 @@ def test_pose_out_of_reach_names_sample_chain_and_rod_length(elbow, chain):
 @every_elbow
 @pytest.mark.parametrize('chain', [1, 2, 3])
 def test_horizontal_rod_raises_singularity(elbow, chain):
-    model = paper_model({'geometry.elbow': elbow})
+    model = states.paper_model({'geometry.elbow': elbow})
     away = -0.25 * chain_vectors(model.robot.geometry)[0][chain - 1]
-    motion = PlatformMotion.at_rest(home_position(elbow) + away * (1 - 1e-6))
+    motion = PlatformMotion.at_rest(states.home_position(elbow) + away * (1 - 1e-6))
     with pytest.raises(SingularityError, match=rf'chain {chain}\b') as caught:
         model.drive_forces(motion)
     assert '0.05' in str(caught.value)  # limits.rod_sine
-    assert_allclose(np.abs(inverse_kinematics(
+    assert_allclose(np.abs(states.inverse_kinematics(
         model.robot.geometry, motion).sin_u[0, chain - 1]), 0, atol=2e-3)
 
 
 @every_elbow
 def test_pose_at_which_the_drives_cannot_hold_the_platform_raises(elbow):
-    model = paper_model({'geometry.elbow': elbow})
+    model = states.paper_model({'geometry.elbow': elbow})
     pose = yaw_with_share(model.robot.geometry, 0.0)
     moving = PlatformMotion.at_rest(np.concatenate((
-        home_position(elbow)[None], pose.position)), np.concatenate((
+        states.home_position(elbow)[None], pose.position)), np.concatenate((
             [[0, 0, 0, 1]], pose.orientation)))
     with pytest.raises(SingularityError, match=r'condition_number|det \[B\]') as caught:
         model.drive_forces(moving)
@@ -196,12 +189,13 @@ def test_pose_at_which_the_drives_cannot_hold_the_platform_raises(elbow):
 
 @every_elbow
 def test_condition_limit_is_where_it_says(elbow):
-    geometry = paper_geometry(elbow)
+    geometry = states.paper_geometry(elbow)
     pose = yaw_with_share(geometry, 0.2)
-    free = paper_model({'geometry.elbow': elbow, 'limits.condition_number': 1e6}).mechanism(pose)
+    free = states.paper_model({
+        'geometry.elbow': elbow, 'limits.condition_number': 1e6}).mechanism(pose)
     number = float(condition_number(geometry, free.links.J)[0])
     above = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 + 1e-9)}
     below = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 - 1e-9)}
-    assert np.all(np.isfinite(paper_model(above).drive_forces(pose).total))
+    assert np.all(np.isfinite(states.paper_model(above).drive_forces(pose).total))
     with pytest.raises(SingularityError, match='condition number'):
-        paper_model(below).drive_forces(pose)
+        states.paper_model(below).drive_forces(pose)
