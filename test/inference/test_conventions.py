@@ -161,7 +161,7 @@ def test_drives_without_efforts_do_not_keep_others_from_being_told() -> None:
 def test_positions_far_out_of_their_stroke_tell_it_without_efforts() -> None:
     time, position, _, _ = robot()
     (finding,) = find_mistakes(MODEL, Recording.from_arrays('mm', time, 1e3 * position))
-    assert 'far out of the stroke, as if they were in millimetres' in finding.text
+    assert 'look like millimetres' in finding.text
 
 
 def test_velocities_that_are_not_the_derivative_are_told() -> None:
@@ -212,7 +212,7 @@ def read_as_told(model: DriveModel, folder: Path, run: Recording,
                  ) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
     readings = [m for m in find_mistakes(model, run) if isinstance(m, OtherReading)]
-    line = columns_line(readings)
+    line = columns_line([scale for each in readings for scale in each.scales])
     write_recording(folder / 'run.csv', run)
     path = folder / 'corrected.yaml'
     path.write_text((folder / 'arm.yaml').read_text() + f'    {line}\n')
@@ -247,7 +247,7 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     run = arm_recording(model, effort=(100 / largest).tolist())
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
-    assert columns_line([finding]) == (
+    assert columns_line(finding.scales) == (
         'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, '
         'reach: {effort_scale: 0.3}}')
 

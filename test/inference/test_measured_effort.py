@@ -26,13 +26,13 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.inference.readings.efforts import (
+from pprs_dynamics.inference.readings.findings import (
+    OtherReading,
     effort_contents,
+    effort_looks_like,
     find_no_measurements,
-    kinds_of,
     looks_like,
 )
-from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
@@ -67,7 +67,7 @@ class Run:
             effort + size * random.normal(size=effort.shape), self.model.drives)
 
     def kinds(self, effort: Array, noise: float = 0.005) -> dict[str, str] | None:
-        return kinds_of(looks_like(self.model, [self.of(effort, noise)]))
+        return effort_looks_like([looks_like(self.model, [self.of(effort, noise)]).values()])
 
 
 def run_of(model: DriveModel, motion: Any, still: Any) -> Run:

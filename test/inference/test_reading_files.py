@@ -279,10 +279,39 @@ def test_efforts_in_shares_of_an_unknown_one_are_a_question(
     assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain'))
 
 
+@pytest.mark.parametrize(('head', 'turn', 'unit'), [
+    ('', 2 * np.pi, (6.88, 6.88)), ('t,q1,q2,tau1,tau2', 2 * np.pi, (9.0, 9.0)),
+    ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.3)), ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.6))])
+def test_amperes_and_percent_that_nearly_fit_are_a_question(
+    head: str, turn: float, unit: tuple[float, float], tmp_path: Path,
+) -> None:
+    """6.88 A per N m are nearly what turns in place of radians do to the efforts."""
+    time, q, _, effort = run_of_arm()
+    first = asked_about(tmp_path, head, time, q / turn, effort / unit)
+    assert 'effort_scale' in ''.join(first.questions)
+
+
+def test_a_torque_that_holds_no_model_is_a_question_and_no_other_unit(tmp_path: Path) -> None:
+    time, q, _, _ = run_of_arm()
+    noise = np.random.default_rng(1).normal(0, 0.1, q.shape)
+    first = asked_about(tmp_path, 't,q1,q2,tau1,tau2', time, q,
+                        noise + np.cumsum(noise, axis=0) / 20)
+    assert 'effort_kind: external' in ''.join(first.questions)
+    assert 'position_scale' not in first.text
+
+
+def test_a_velocity_by_its_name_alone_is_not_used(tmp_path: Path) -> None:
+    time, q, _, effort = run_of_arm()
+    noise = np.random.default_rng(1).normal(0, 1.0, q.shape)
+    first = asked_about(tmp_path, 't,q1,q2,dq1,dq2,tau1,tau2', time, q, noise, effort)
+    assert any('is not the derivative of q1' in note for note in first.notes)
+    assert 'velocity' not in first.text.partition('columns:')[2].replace('called a velocity', '')
+
+
 def test_a_recording_that_cannot_be_checked_is_a_question(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fails(*_: object) -> None:
+    def fails(*_: object, **__: object) -> None:
         raise MotionError('recording', 'it fails', 'not fail', 'shape')
 
     monkeypatch.setattr('pprs_dynamics.app.api.first_model.find_mistakes', fails)

@@ -17,21 +17,20 @@ import numpy as np
 
 from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
-from pprs_dynamics.inference.readings.check import find_mistakes, unlike_masses
+from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
     Guess,
     GuessError,
     guess_columns,
 )
-from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
-from pprs_dynamics.inference.readings.names import joint_in, unit_of, words_of
+from pprs_dynamics.inference.readings.findings import OtherReading, lines_of
+from pprs_dynamics.inference.readings.names import joint_in, words_of
 from pprs_dynamics.inference.readings.table import (
     COMMANDS,
     CURRENT,
     EFFORT,
     POSITION,
-    SAME_MASSES,
     SHARE,
     VELOCITY,
     WORDS,
@@ -39,7 +38,7 @@ from pprs_dynamics.inference.readings.table import (
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_bag_folder, is_storage
 from pprs_dynamics.measurement.files.contents import Contents, look_into
-from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 from pprs_dynamics.physics.mechanism.branches import Branch, as_likely, branch_to, root_of
 from pprs_dynamics.physics.mechanism.description import FIXED, FLOATING, PRISMATIC, Description
@@ -261,7 +260,7 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
         model = draft.model
         try:
             recording = read_recording(path, model.recorded)
-            mistakes = find_mistakes(model, recording)
+            mistakes = find_mistakes(model, recording, is_first=True)
         except PprsError as error:
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
             return notes + draft.questions
@@ -269,11 +268,12 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
         sure = [each for each in readings if each.scales and each.kind in SURE_KINDS
                 and corrected.isdisjoint((each.kind, drive) for drive, _, _ in each.scales)]
         if not sure:
+            # What a line can say of efforts that are no measurement is a question as well.
             draft.questions += [
-                each.what + (f': if so, write {line}' if line else '') for each in readings
-                for line in [each.line or columns_line([each])]]
+                each.what + ''.join(f': if so, write {line}' for line in lines_of([each]))
+                for each in mistakes if isinstance(each, OtherReading) or lines_of([each])]
             if not any(each.kind.startswith(('effort', 'drive_constant')) for each in readings):
-                draft.questions += _questions_of_names(draft, model, recording)
+                draft.questions += _questions_of_names(draft)
             return notes + draft.questions
         for each in sure:
             corrected |= {(each.kind, drive) for drive, _, _ in each.scales}
@@ -283,10 +283,8 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
-def _questions_of_names(draft: FirstModel, model: DriveModel, recording: Recording) -> list[str]:
-    """Return questions about commands, and about efforts whose unit a file does not say."""
-    efforts = {drive: column for drive in draft.drives
-               if (column := draft.columns.get(drive, {}).get(EFFORT)) is not None}
+def _questions_of_names(draft: FirstModel) -> list[str]:
+    """Return questions about commands, and about shares of a torque that a file does not say."""
     chosen = [column for drive in draft.drives for kind in (POSITION, EFFORT) if isinstance(
         column := draft.columns.get(drive, {}).get(kind), str)]
     commands = [column for column in chosen if {*words_of(column)} & COMMANDS]
@@ -299,17 +297,7 @@ def _questions_of_names(draft: FirstModel, model: DriveModel, recording: Recordi
         return [f'{", ".join(shares)}: a share of a torque or force that the file does not name. '
                 'Write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
                 f'columns: {{{draft.drives[0]}: {{effort_scale: 0.3}}}}']
-    unlike = unlike_masses(model, recording) if efforts else {}
-    factors = {drive: unlike[drive] for drive, column in efforts.items() if drive in unlike and (
-        isinstance(column, int) or (unit_of(column) is None and abs(
-            np.log(abs(unlike[drive]))) > np.log(SAME_MASSES)))}
-    scales = ', '.join(f'{drive}: {{effort_scale: {1 / factor:.3g}}}'
-                       for drive, factor in factors.items())
-    listed = ', '.join(f'{factor:.3g} ({drive})' for drive, factor in factors.items())
-    return [f'the unit of the efforts is not known, and they are another multiple of what the '
-            f'masses need: {listed}. If they are percent or another unit, write its factor as '
-            f'effort_scale, about columns: {{{scales}}}; if they are N m or N, go on'
-            ] if factors else []
+    return []
 
 
 # ------------------------------------------------------------------------------ description

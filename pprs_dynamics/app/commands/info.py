@@ -15,12 +15,7 @@ from pprs_dynamics.app.api.simulate import recording_page
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
 from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
 from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
-from pprs_dynamics.inference.readings.findings import (
-    Mistake,
-    OtherReading,
-    columns_line,
-    effort_looks_like,
-)
+from pprs_dynamics.inference.readings.findings import effort_looks_like, lines_of
 from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -74,12 +69,8 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
         screen.print(reading_table(summary, model.recorded))
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
-        others = [finding for finding in summary.findings if isinstance(finding, OtherReading)]
-        if line := columns_line(others, model.recorded.columns is not None):
+        for line in lines_of(summary.findings, model.recorded.columns is not None):
             screen.print(f'  if so, write into the model file  {shown(line)}')
-        for finding in summary.findings:
-            if isinstance(finding, Mistake) and finding.line:
-                screen.print(f'  if so, write into the model file  {shown(finding.line)}')
         if not summary.findings:
             screen.print('[green]nothing wrong found[/]')
     repeat = find_repeat(recordings)

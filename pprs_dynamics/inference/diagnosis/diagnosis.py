@@ -17,8 +17,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.efforts import kinds_of
-from pprs_dynamics.inference.readings.findings import NoMeasurement
+from pprs_dynamics.inference.readings.findings import NoMeasurement, effort_looks_like
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -375,7 +374,7 @@ class Diagnosis:
             'stick_slip': {drive: {'frequency': slip.frequency, 'speed': slip.speed,
                                    'step': slip.step, 'share_of_time': slip.share}
                            for drive, slip in self.stick_slip.items()},
-            'effort_looks_like': kinds_of(self.effort_looks_like),
+            'effort_looks_like': effort_looks_like([self.effort_looks_like.values()]),
             'explained': explained_shares(self.residuals), 'little_explained': self.little,
             'explained_after': explained_shares(self.residuals, self.remaining),
             'reference': self.since,

@@ -18,11 +18,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
-from pprs_dynamics.inference.readings.efforts import (
-    find_no_measurements,
-    find_sign_bit,
-    find_unsigned,
-)
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
     Likelihood,
@@ -33,17 +28,20 @@ from pprs_dynamics.inference.readings.evidence import (
 )
 from pprs_dynamics.inference.readings.findings import (
     OtherReading,
-    columns_line,
+    find_no_measurements,
     find_other_velocities,
+    find_sign_bit,
+    find_unsigned,
     findings_of,
-    position_scales,
+    lines_of,
+    near,
     velocity_factors,
 )
-from pprs_dynamics.inference.readings.table import Reading, named, readings
+from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Defect, Indices, Mask
+from pprs_dynamics.measurement.files.samples import Defect, Indices
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
@@ -62,8 +60,8 @@ class Fit:
         [nats].
     left, most_left : float
         Mean residual and the largest of a drive, over the squared effort.
-    prior : float
-        Largest prior cost of a drive [nats].
+    prior, mean_prior : float
+        Largest and weighted mean prior cost of a drive [nats].
     least_left : float
         Smallest residual of a drive.
     is_rigid : bool
@@ -76,6 +74,7 @@ class Fit:
     most_left: float = 1.0
     prior: float = 0.0
     least_left: float = 1.0
+    mean_prior: float = 0.0
     is_rigid: bool = False
 
 
@@ -90,13 +89,13 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
     mistakes = find_mistakes(model, recording)
     others = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
     if refuse and others:
-        raise MisreadError(recording.name, [other.what for other in others], [
-            columns_line(others, model.recorded.columns is not None),
-            *(other.line for other in others)])
+        raise MisreadError(recording.name, [other.what for other in others],
+                           lines_of(others, model.recorded.columns is not None))
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 
-def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]:
+def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = False,
+                  ) -> tuple[Defect, ...]:
     """Return the mistakes of a recording's names, units and signs, as findings.
 
     Parameters
@@ -104,10 +103,12 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     model : DriveModel
     recording : Recording
         Of the model's drives.
+    is_first : bool
+        Whether nobody has checked the unit of its efforts yet.
     """
     if found := tuple(find_sign_bit(recording)):
         return found
-    search = Search(model, recording)
+    search = Search(model, recording, is_first=is_first)
     if wrong := [each for each in find_other_velocities(model, search.excerpts.get(1.0))
                  if each.kind == 'rate']:
         return tuple(wrong)
@@ -121,11 +122,8 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
         mistakes = [OtherReading.of(
             kind, model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in each) or PLAIN for each in each_of),
-            ' or '.join(filter(None, (line for each in each_of for line in (
-                columns_line(each, has_columns), *(mistake.line for mistake in each))))))]
+            ' or '.join(line for each in each_of for line in lines_of(each, has_columns)))]
     kinds = {mistake.kind for mistake in mistakes}
-    if not kinds & {'position_unit', 'drive_order', 'ambiguous'}:
-        mistakes += search.far_outside(recording)
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
             likely[0].reading.time_unit if likely else 1.0))
@@ -139,17 +137,6 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     return tuple(mistakes)
 
 
-def unlike_masses(model: DriveModel, recording: Recording) -> dict[str, float]:
-    """Return the factors of drives whose efforts are certainly another multiple of the masses'."""
-    excerpt = excerpt_of(recording, table.STRETCHES)
-    evidence = None if excerpt is None else Evidence.of(model, excerpt)
-    factors = {} if evidence is None else {
-        drive: evidence.factor(d, d) for d, drive in enumerate(model.drives)
-        if evidence.is_measured(d, d)}
-    return {drive: factor for drive, factor in factors.items()
-            if abs(np.log(abs(factor))) > np.log(table.OTHER_UNIT)}
-
-
 class Search:
     """The search for a reading that is more likely than the plain one.
 
@@ -159,10 +146,12 @@ class Search:
     recording : Recording
     efforts : (N, E) array, optional
         Of all columns that may be efforts, in place of those of the recording.
+    is_first : bool
+        Whether nobody has checked the unit of the efforts yet.
     """
 
     def __init__(self, model: DriveModel, recording: Recording, efforts: Array | None = None,
-                 ) -> None:
+                 is_first: bool = False) -> None:
         self.model = model
         times = _time_units(recording)
         self.excerpts = {
@@ -171,11 +160,16 @@ class Search:
         turning = [units.turns for units in model.units]
         self.rows = readings(model.drives, model.units, self._loads(), times,
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
-        # Amperes are more likely where no name says that it is an effort.
+        # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
+        # may be any, the more so where no name says that a column is an effort.
         names = [] if model.recorded.columns is None else [
             drive.names.get('effort') for drive in model.recorded.columns.drives.values()]
-        self.price_of_constants = table.COST['drive_constant'] - table.UNNAMED * (
-            efforts is not None or any(isinstance(name, int) for name in names))
+        is_unnamed = efforts is not None or any(isinstance(name, int) for name in names)
+        self.cost_of_constants = table.COST['drive_constant'] - (
+            table.UNNAMED if is_unnamed else table.UNCHECKED if is_first else 0.0)
+        self.is_first = is_first or efforts is not None
+        self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
+        self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
         # Of currents without a known gain no force is known: masses and units say nothing.
         self.has_gain = model.effort_kind != CURRENT or model.knows_currents
         self.masses = table.MASSES if self.has_gain else np.inf
@@ -233,19 +227,20 @@ class Search:
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
         self.start = start = self.fit(first) or Fit(first)
         self.fits = [start]
-        is_inside = 1.0 in self.excerpts and not self._outside(first, self.excerpts[1.0])
+        is_inside = not self._outside(first)
         # Without masses a gravity of any size may explain positions in another unit.
-        explains = is_inside and start.reading.is_plain and self.has_gain and (
-            start.prior < table.PLAUSIBLE)
-        if explains and start.most_left < table.CLOSE_FIT:
+        explains = is_inside and start.reading.is_plain and self.has_gain
+        if explains and self._explains(start):
             return start
-        is_explained = explains and start.most_left < table.EXPLAINED
+        is_explained = explains and start.most_left < table.EXPLAINED and (
+            start.prior < self.plausible)
+        # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
+        tried = {'position_unit', 'drive_order'} if is_explained else {*table.COST}
         seed = None
         while self._top() is not seed:
             seed = self._top()
             self.fits += [fit for row in self.rows[1:]
-                          if (row.kind == 'drive_order' or not is_explained)
-                          and self._may_follow(row, seed.reading)
+                          if row.kind in tried and self._may_follow(row, seed.reading)
                           and (fit := self.fit(row.after(seed.reading))) is not None
                           and self._is_credible(row, fit)]
         return self._top()
@@ -253,13 +248,22 @@ class Search:
     def likely(self) -> list[Fit]:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
         best = self.best()
-        is_sure = not best.reading.is_plain and best.left <= table.GOOD_FIT and (
-            self._is_certain(best))
+        if best.reading.is_plain or best.left > table.GOOD_FIT:
+            far = self._reach(self.start.reading) > table.FAR
+            if best.left <= table.GOOD_FIT:
+                # Angles that explain the efforts are in the right unit, whatever limits say.
+                far &= [not units.turns for units in self.model.units]
+            rows = [row for row in self.rows if np.any(far) and row.kind == 'position_unit'
+                    and self._possible(row, self.excerpts[1.0])]
+            if rows:
+                return [Fit(rows[0].after(self.rows[0])), self.start]
         # The inertia of a drive without weight may be invented, a unit of its efforts not.
         evidence, scales = self.evidence(best.reading), best.reading.effort_scale
-        is_sure &= evidence is not None and (evidence.has_weight or bool(
-            np.all(np.isin(scales, table.SCALES))))
-        return [best, *self._rivals(best)] if is_sure else []
+        if best.left > table.GOOD_FIT or evidence is None or not self._is_certain(best) or not (
+                self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))):
+            return []
+        rivals = self._rivals(best)
+        return [best, *rivals] if not best.reading.is_plain or (self.is_first and rivals) else []
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""
@@ -311,6 +315,9 @@ class Search:
         excerpt = self.excerpts.get(reading.time_unit)
         if excerpt is None or (reading.kinds and not self._possible(reading, excerpt)):
             return None
+        cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
+        if not np.isfinite(excerpt.effort).any():
+            return Fit(reading, -cost, 0.0, 0.0)
         evidence = self.evidence(reading)
         # A mounting without weight explains none.
         if evidence is None or (reading.gravity is not None and not evidence.has_weight):
@@ -320,8 +327,7 @@ class Search:
                     if evidence.is_measured(d, reading.efforts[d])]
         if not measured:
             return None
-        weight, cost = weights[measured], (
-            reading.cost + self._outside(reading, excerpt) + self._against_velocities(reading))
+        weight = weights[measured]
 
         @cache
         def likelihood(d: int, scale: float) -> Likelihood:
@@ -329,53 +335,48 @@ class Search:
 
         def fit_of(scales: Array, price: float, share: str = '') -> Fit:
             found = [likelihood(d, float(scales[d])) for d in measured]
-            score = float(sum(w * each.score for w, each in zip(weight, found, strict=True)))
-            return Fit(replace(reading, effort_scale=scales, share=share), score - cost - price,
-                       float(np.exp(np.average(np.log([each.left for each in found]),
-                                               weights=weight))),
-                       max(each.left for each in found), max(each.prior for each in found),
-                       min(each.left for each in found))
+            score, left, prior = (np.array(each) for each in (
+                [each.score for each in found], [each.left for each in found],
+                [each.prior for each in found]))
+            return Fit(replace(reading, effort_scale=scales, share=share),
+                       float(weight @ score) - cost - price,
+                       float(np.exp(np.average(np.log(left), weights=weight))),
+                       float(left.max()), float(prior.max()), float(left.min()),
+                       float(np.average(prior, weights=weight)))
 
         def alone(d: int, scales: Sequence[float]) -> float:
             return max((likelihood(d, scale).score - _cost([scale]) / weights[d], scale)
                        for scale in scales)[1]
 
         first = fit_of(np.ones(len(weights)), 0.0)
-        if not reading.kinds and first.most_left < table.CLOSE_FIT and (
-                first.prior < table.PLAUSIBLE):
+        if not reading.kinds and self._explains(first):
             return first
-        factors = np.array([
-            evidence.factor(d, column) if evidence.is_measured(d, column) else np.nan
-            for d, column in enumerate(reading.efforts.tolist())])
         fits = [first, *(fit_of(*row) for row in self._effort_rows(
-            factors, measured, np.asarray(np.isfinite(excerpt.effort).any(axis=0))[reading.efforts],
-            evidence.has_weight, alone))]
-        for part in reading.parts:
-            if part.kind in ('position_offset', 'position_unit', 'mounting'):
-                # Another direction of weight is credible only for efforts that show the weight.
-                fits = [fit for fit in fits if min([
-                    likelihood(d, float(fit.reading.effort_scale[d])).prior for d in measured
-                    if d in part.drives], default=0.0) <= table.PLAUSIBLE]
+            reading, evidence, measured, alone))]
+        if reading.kinds & {'position_offset', 'position_unit', 'mounting'}:
+            # Another weight is credible only for efforts that show weight or inertia.
+            fits = [fit for fit in fits if fit.mean_prior <= table.PLAUSIBLE]
         return max(fits, key=lambda fit: fit.score, default=None)
 
-    def _effort_rows(self, factors: Array, measured: Sequence[int], recorded: Mask,
-                     has_weight: bool, alone: Callable[[int, Sequence[float]], float],
+    def _explains(self, fit: Fit) -> bool:
+        """Whether hardly anything may be explained better."""
+        return fit.most_left < table.CLOSE_FIT and fit.prior < self.plausible
+
+    def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
+                     alone: Callable[[int, Sequence[float]], float],
                      ) -> Iterator[tuple[Array, float, str]]:
         """Yield scales of efforts, (D,), their prior cost and the share that they are.
 
         Parameters
         ----------
-        factors : (D,) array
-            Of weight and inertia in the efforts, or NaN.
+        reading : Reading
+        evidence : Evidence
         measured : sequence of int
             Drives whose efforts count.
-        recorded : (D,) bool array
-            Drives with efforts.
-        has_weight : bool
         alone : callable
             Returns the likeliest of some scales of a drive.
         """
-        same, every = np.log(table.SAME_MASSES), np.arange(len(factors))
+        factors = np.array([evidence.factor(d, e) for d, e in enumerate(reading.efforts.tolist())])
         units = [scale for scale in table.SCALES if self.has_gain or abs(scale) == 1]
         if not all(drive.turns for drive in self.model.units):
             units = [scale for scale in units if abs(scale) != table.KGF_CM]
@@ -386,7 +387,7 @@ class Search:
             return abs(scale) == 1 or bool(
                 len(off) and off.max() < np.log(table.OFF_IN_UNIT[abs(scale)]))
 
-        scales = np.ones(len(factors))
+        drives, scales, same = np.arange(len(factors)), np.ones(len(factors)), self.same_masses
         for d in measured:
             scales[d] = alone(d, [scale for scale in units if scale in table.OF_ONE
                                   and is_near(scale, [d])])
@@ -394,27 +395,31 @@ class Search:
         yield scales, _cost(scales[measured]) if np.ptp(scales[measured]) == 0 else sum(
             _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds), ''
         # Inertia alone may be invented: units that are no prefixes need a weight.
-        for scale in (scale for scale in units if has_weight or scale in table.OF_ONE):
+        for scale in (scale for scale in units if evidence.has_weight or scale in table.OF_ONE):
             if is_near(scale, measured):
+                recorded = evidence.total[drives, reading.efforts] > 0
                 yield np.where(recorded, scale, 1.0), _cost([scale]), ''
         known = [d for d in measured if np.isfinite(factors[d])]
         signs, sizes = np.sign(factors[known]), np.abs(factors[known])
         if not (known and self.has_gain) or np.ptp(signs) > 0:
             return
         price, limits = _cost(signs[:1]), self.model.limits.efforts
-        if has_weight and len(known) > 1 and np.all(np.isfinite(limits[known])):
+        if evidence.has_weight and len(known) > 1 and np.all(np.isfinite(limits[known])):
             for share, name in table.SHARES.items():
                 scales = signs[0] / (share * limits)
                 # Factors near 1 are errors of masses.
                 if np.any(np.abs(np.log(np.abs(scales[known]))) > same) and np.all(
                         np.abs(np.log(factors[known] / scales[known])) < same):
                     yield scales, price + table.COST['effort_unit'] + 1.0, name
-        # A load may multiply what one drive of several needs; constants near a unit are that.
-        if len(known) >= min(2, len(factors)) and np.all(
-                np.abs(np.log(sizes)) > same) and np.all(sizes > table.LARGEST_COMPLIANCE) and (
-                not any(is_near(scale, known) for scale in table.OF_ONE if abs(scale) != 1)):
-            yield (np.where(np.isin(every, known), factors, 1.0),
-                   price + self.price_of_constants, '')
+        # A load may multiply what one drive of several needs, and factors of each drive explain
+        # it as well; constants near a unit are that.
+        off = np.abs(np.log(sizes)) > same
+        is_off = not reading.load and np.any(off) if self.is_first else (
+            np.all(off) and len(known) >= min(2, len(factors)))
+        if is_off and np.all(sizes > table.LARGEST_COMPLIANCE) and not any(
+                is_near(scale, known) for scale in units if abs(scale) != 1):
+            yield (np.where(np.isin(drives, known), factors, 1.0),
+                   price + self.cost_of_constants, '')
 
     def _weights(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> Array:
         """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
@@ -460,52 +465,34 @@ class Search:
         of_motion = sorted({k for part in reading.parts for k in part.drives}) or slice(None)
         return not np.any(((position < lower - slack) | (position > upper + slack))[:, of_motion])
 
-    def _outside(self, reading: Reading, excerpt: Excerpt) -> float:
+    def _reach(self, reading: Reading) -> Array:
+        """Return the largest positions over the ends of the strokes, (D,)."""
+        excerpt = self.excerpts.get(reading.time_unit)
+        if excerpt is None:
+            return np.zeros(len(self.model.drives))
+        reach = np.abs(read_motion(excerpt.motion, reading).position).max(axis=0)
+        return np.asarray(reach / np.maximum(*np.abs(self.strokes)))
+
+    def _outside(self, reading: Reading) -> float:
         """Return the cost of positions and speeds that are beyond their limits."""
-        lower, upper = self.strokes
+        excerpt = self.excerpts.get(reading.time_unit)
+        if excerpt is None:
+            return 0.0
         motion = read_motion(excerpt.motion, reading)
-        reach = np.abs(motion.position).max(axis=0) / np.maximum(np.abs(lower), np.abs(upper))
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
-            np.isfinite(lower), self.model.speed_limits, np.inf)
-        most = float(np.max(np.maximum(reach, speed)))
+            np.isfinite(self.strokes[0]), self.model.speed_limits, np.inf)
+        most = float(np.max(np.maximum(self._reach(reading), speed)))
         return (table.FAR_OUTSIDE if most > table.FAR
                 else table.OUTSIDE if most > table.BEYOND else 0.0)
 
     def _against_velocities(self, reading: Reading) -> float:
         """Return the cost of units of positions that no unit of the recorded velocities suits."""
-        def is_one_of(units: Sequence[float], factor: float) -> bool:
-            return any(abs(abs(factor / unit) - 1) < table.RATE_OFF for unit in units)
-
+        units = (1.0, *table.VELOCITY_UNITS)
         # Velocities are in the unit of the positions, or in one of their own.
-        unlike = [d for d, factor in self.factors.items() if reading.scale[d] != 1 and not (
-            is_one_of((1.0,), factor) or is_one_of(
-                (1.0, *table.VELOCITY_UNITS), factor / float(reading.scale[d])))]
-        return table.UNLIKE_VELOCITY * bool(unlike)
-
-    def far_outside(self, recording: Recording) -> Iterator[OtherReading]:
-        """Yield positions far beyond the strokes, which no effort is needed to recognise."""
-        ends = np.maximum(-self.strokes[0], self.strokes[1])
-        reach, units = np.abs(recording.position).max(axis=0), self.model.units
-        for turns in (False, True):
-            alike = tuple(k for k, unit in enumerate(units) if unit.turns == turns)
-            far = [k for k in alike if reach[k] > table.FAR * ends[k]]
-            # Angles that explain the efforts well are in the right unit, whatever limits say.
-            if not far or (turns and self.start.left <= table.GOOD_FIT):
-                continue
-            rows = [row for row in self.rows if row.kind == 'position_unit'
-                    and {*far} <= {*row.drives} <= {*alike}
-                    and np.all((reach * row.scale <= ends)[[*row.drives]])]
-            best = min(rows, key=lambda row: len(row.drives), default=None)
-            group = alike if turns else tuple(far) if best is None else best.drives
-            farthest = max(far, key=lambda k: reach[k] / ends[k])
-            unit = '' if best is None else (
-                f', as if they were in {best.what.partition(" like ")[2]}')
-            # Efforts that could not confirm it leave it a question.
-            yield OtherReading.of(
-                'stroke' if turns and np.isfinite(recording.effort).any() else 'position_unit',
-                recording.drives, group, f'the positions of {named(recording.drives, group)} '
-                f'reach {reach[farthest]:.4g} {units[farthest].position}, far out of the stroke'
-                + unit, scales=() if best is None else position_scales(self.model, best, best))
+        return table.UNLIKE_VELOCITY * any(
+            scale != 1 and not near(abs(factor), (1.0,)) and not near(factor / scale, units)
+            for factor, scale in ((factor, float(reading.scale[d]))
+                                  for d, factor in self.factors.items()))
 
 
 def _cost(scales: Sequence[float] | Array) -> float:

@@ -16,6 +16,7 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.check import Fit, Search
+from pprs_dynamics.inference.readings.findings import columns_line
 from pprs_dynamics.inference.readings.links import (
     Layout,
     Links,
@@ -43,7 +44,6 @@ from pprs_dynamics.measurement.files.table_files import (
     fraction_of_seconds,
 )
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_yaml import scalar
 
 Columns = dict[tuple[str, str], Column]
 TIME_WORDS = {'time', *TIME_LIKE}
@@ -66,17 +66,10 @@ class AmbiguousColumns(GuessError):
     """
 
     def __init__(self, joints: Sequence[str], readings: Sequence[Columns], what: str) -> None:
-        self.lines = tuple(_line(joints, reading) for reading in readings)
-        super().__init__(f'{what}, write one of them: '
-                         + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
-
-
-def _line(joints: Sequence[str], reading: Columns) -> str:
-    """Return the content of the block `columns` of a model file."""
-    entries = {joint: ', '.join(f'{key}: {scalar(column)}' for (of, key), column in reading.items()
-                                if of == joint) for joint in ('', *joints)}
-    return ', '.join(f'{scalar(joint)}: {{{entry}}}' if joint else entry
-                     for joint, entry in entries.items() if entry)
+        self.lines = tuple(columns_line((joint, key, reading[of, key]) for joint in ('', *joints)
+                                        for of, key in reading if of == joint)
+                           for reading in readings)
+        super().__init__(f'{what}, write one of them: {" or ".join(self.lines)}')
 
 
 @dataclass(frozen=True)
@@ -344,24 +337,22 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
         if any(fit.most_left < table.EXPLAINED and fit.prior < table.PLAUSIBLE
                for fit, _, _ in fits):
             break
-    most = max((fit.score for fit, _, _ in fits), default=0.0)
-    near = [each for each in fits if each[0].score > most - table.SURE]
+    fits.sort(key=lambda each: -each[0].score)
+    near = [each for each in fits if each[0].score > fits[0][0].score - table.SURE]
     # Of positions that explain as much the smoothest, as no effort is.
     layout = min([each[1] for each in near] or found[:1],
                  key=lambda layout: roughness(values[:, layout.positions]))
     near = [each for each in near if each[1] is layout]
     efforts = [group for *_, group in near]
-    used = [*layout.positions, *layout.velocities]
-    unlike = [group for group in efforts[1:] if not move_alike(values, efforts[0], group)]
-    if unlike:
-        raise AmbiguousColumns(joints, [read(layout, group) for group in (efforts[0], unlike[0])],
+    rivals = [each for each in near if not move_alike(values, efforts[0], each[2])]
+    if near and near[0][0].left > table.GOOD_FIT:
+        rivals += [each for each in fits if each is not near[0]]
+    if rivals:
+        raise AmbiguousColumns(joints, [read(of, group) for _, of, group in (near[0], rivals[0])],
                                'two readings of the columns are as likely')
-    if len(fits) > 1 and near[0][0].left > table.GOOD_FIT:
-        likeliest = sorted(fits, key=lambda each: -each[0].score)[:2]
-        raise AmbiguousColumns(joints, [read(of, group) for _, of, group in likeliest],
-                               'no reading of the columns explains efforts well')
     if not efforts or (near[0][0].least_left < table.NO_EFFORT < near[0][0].most_left
                        and not near[0][0].is_rigid):
+        used = [*layout.positions, *layout.velocities]
         _ask_for_one(joints, read(layout), [
             each.column for place, each in enumerate(series) if place not in used])
     if len(series) == count and not count % 2:
@@ -372,7 +363,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
     chosen = efforts[measured(values, efforts)] if efforts else []
-    unused = [place for place in range(len(series)) if place not in {*used, *chosen}]
+    unused = [place for place in range(len(series)) if place not in {
+        *layout.positions, *layout.velocities, *chosen}]
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}' for kind, places in (
         (POSITION, layout.positions), (VELOCITY, layout.velocities), (EFFORT, chosen)) if places]
     notes.append('no header: ' + ', '.join(told) + (

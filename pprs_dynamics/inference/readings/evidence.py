@@ -174,13 +174,15 @@ class Evidence:
 
     def factor(self, drive: int, column: int) -> float:
         """Return the factor of inertia and gravity in efforts; NaN where it is not certain."""
+        if not self.is_measured(drive, column):
+            return np.nan
         root = self.roots[drive, column]
         rigid = root[:, INERTIA] + root[:, GRAVITY]
         columns = [rigid, root[:, VELOCITY], root[:, DIRECTION]]
         if not _is_steady(root, rigid):
             columns.append(root[:, CONSTANT])
         factors, doubts, _ = fitted(root[:, EFFORT], columns)
-        return factors[0] if abs(factors[0]) > table.CERTAIN * doubts[0] else float('nan')
+        return factors[0] if abs(factors[0]) > table.CERTAIN * doubts[0] else np.nan
 
 
 def _is_steady(root: Array, force: Array) -> bool:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -13,15 +13,25 @@ import numpy as np
 
 from pprs_dynamics.drives import DriveColumns, RecordedColumns
 from pprs_dynamics.inference.readings import table
-from pprs_dynamics.inference.readings.evidence import gravity_in
+from pprs_dynamics.inference.readings.evidence import (
+    Evidence,
+    Shares,
+    effort_contents,
+    gravity_in,
+)
 from pprs_dynamics.inference.readings.table import Reading, named
 from pprs_dynamics.inference.residuals.excerpt import Excerpt
-from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.recording import Recording, signed
 from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.physics.model import recorded_names
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 from pprs_dynamics.system.plain_yaml import scalar
 
-Scales = tuple[tuple[str, str, float | str | int], ...]
+KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
+         recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
+Scale = tuple[str, str, float | str | int]  # drive, key below `columns`, value
+Scales = tuple[Scale, ...]
 
 
 @dataclass(frozen=True)
@@ -34,9 +44,12 @@ class Mistake(Defect):
         See `Defect`.
     line : str
         What to write into the model file, so that it is read as it looks; '' where no line does.
+    scales : tuple of (drive, key, value)
+        The same below `columns`; '' for keys of no drive.
     """
 
     line: str = ''
+    scales: Scales = ()
 
     @classmethod
     def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str,
@@ -70,35 +83,31 @@ def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]
     return [finding for each in findings for finding in each if isinstance(finding, NoMeasurement)]
 
 
-@dataclass(frozen=True)
 class OtherReading(Mistake):
-    """A finding that a recording is in other units, signs or another order than it says.
-
-    Parameters
-    ----------
-    kind, count, what, spans, drives, line
-        See `Mistake`.
-    scales : tuple of (drive, key, value)
-        Of `columns` in the model file, so that it is read as it looks; '' for keys of no drive.
-    """
-
-    scales: Scales = ()
+    """A finding that a recording is in other units, signs or another order than it says."""
 
 
-def columns_line(findings: Iterable[OtherReading], has_columns: bool = False) -> str:
+def columns_line(scales: Iterable[Scale], has_columns: bool = False) -> str:
     """Return the line of a model file with which a recording is read as it looks; '' for none.
 
     Where the file has `columns` already, what is to be added to the columns of each drive.
     """
     blocks: dict[str, dict[str, None]] = {}
-    for drive, key, value in (scale for finding in findings for scale in finding.scales):
+    for drive, key, value in scales:
         blocks.setdefault(drive, {})[
             f'{key}: {scalar(value) if isinstance(value, str | int) else f"{value:.7g}"}'] = None
-    entries = [entry if not drive else f'{drive}: {{{entry}}}' for drive, entry in (
+    entries = [entry if not drive else f'{scalar(drive)}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
     if has_columns and entries:
         return f'under columns, beside what stands there: {", ".join(entries)}'
     return f'columns: {{{", ".join(entries)}}}' if entries else ''
+
+
+def lines_of(findings: Iterable[Defect], has_columns: bool = False) -> list[str]:
+    """Return the lines of a model file with which a recording is read as findings say."""
+    mistakes = [finding for finding in findings if isinstance(finding, Mistake)]
+    first = columns_line([scale for mistake in mistakes for scale in mistake.scales], has_columns)
+    return [*filter(None, (first, *(mistake.line for mistake in mistakes)))]
 
 
 # -------------------------------------------------------------------------- of other readings
@@ -123,12 +132,11 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
             found.append(OtherReading.of(part.kind, drives, part.drives, part.what, line,
                                          scales=changes))
 
-    def of(kind: str, group: Sequence[int], what: str, line: str = '') -> None:
+    def of(kind: str, group: Sequence[int], what: str) -> None:
         changes = tuple((drives[k], 'effort_scale', _as_read(
             model, drives[k]).effort_scale / float(scales[k])) for k in group)
         noun = f'the effort of {named(drives, tuple(group))}'
-        found.append(OtherReading.of(kind, drives, group, f'{noun} {what}', line,
-                                     scales=() if line else changes))
+        found.append(OtherReading.of(kind, drives, group, f'{noun} {what}', scales=changes))
 
     if reading.share:
         of('effort_share', every, f"looks like {reading.share} of the drives' largest")
@@ -138,9 +146,10 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         # Drives without weight and inertia show none of their own: another's is nearer than 1.
         other = np.median(scales[scales != 1])
         gains = ', '.join(f'{1 / (other if scale == 1 else scale):.3g}' for scale in scales)
-        of('drive_constant', every, f'is another multiple of what the masses need: {listed}: it '
-           'looks like currents in amperes, percent of a torque, or another unit',
-           f'effort_kind: current, and beside urdf or mjcf  gain: [{gains}]')
+        of('drive_constant', np.flatnonzero(scales != 1).tolist(),
+           f'is another multiple of what the masses need: {listed}: it looks like currents in '
+           f'amperes (then write effort_kind: current, and beside urdf or mjcf  gain: [{gains}]), '
+           'percent of a torque, or another unit')
     else:
         for scale in dict.fromkeys(scales[scales != 1].tolist()):
             group = np.flatnonzero(scales == scale).tolist()
@@ -161,26 +170,23 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
     """
     factors = {} if excerpt is None else velocity_factors(excerpt)
     common = float(np.median([*factors.values()])) if factors else 0.0
-    drives, columns, off = model.drives, model.recorded.columns, table.RATE_OFF
+    drives, columns = model.drives, model.recorded.columns
     if columns is not None and common > 0 and all(
-            abs(factor / common - 1) <= off for factor in factors.values()):
-        if columns.rate is not None and all(
-                abs(common / unit - 1) >= off for unit in (1.0, *table.VELOCITY_UNITS)):
-            rate = float(f'{columns.rate * common:.3g}')
+            near(factor, [common]) for factor in factors.values()):
+        units = [*table.TIMES, *(1 / unit for unit in table.TIMES)]
+        rate, said = columns.rate, ''
+        if rate is not None and not near(common, (1.0, *table.VELOCITY_UNITS)):
+            value = float(f'{rate * common:.3g}')
+            key, said = 'rate', f'there were {value:g} samples per second, not {rate:g}'
+        # No velocity of an angle is in thousandths.
+        elif rate is None and all(unit.turns for unit in model.units) and near(common, units):
+            key, said = 'time_scale', 'the times were in another unit'
+            value = (columns.time_scale or 1.0) / near(common, units)
+        if said:
             yield OtherReading('rate', 1, f'the recorded velocities are {common:.4g} times the '
-                               f'derivatives of the positions at {columns.rate:g} samples per '
-                               f'second, as if there were {rate:g}', scales=(('', 'rate', rate),))
+                               f'derivatives of the positions, as if {said}',
+                               scales=(('', key, value),))
             return
-        if columns.rate is None and all(units.turns for units in model.units):
-            # No velocity of an angle is in thousandths.
-            unit = next((unit for each in table.TIMES for unit in (each, 1 / each)
-                         if abs(common / unit - 1) < off), None)
-            if unit is not None:
-                yield OtherReading('rate', 1, f'the recorded velocities are {unit:g} times the '
-                                   'derivatives of the positions, as if the times were in another '
-                                   'unit', scales=(('', 'time_scale', (
-                                       columns.time_scale or 1.0) / unit),))
-                return
     groups: dict[float, list[int]] = {}
     for drive, factor in factors.items():
         for wrong in table.VELOCITY_UNITS:
@@ -193,6 +199,11 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
             f'is {times} the derivative of the position', scales=tuple(
                 (drives[k], 'velocity_scale', _as_read(model, drives[k]).velocity_scale / factor)
                 for k in group))
+
+
+def near(factor: float, units: Iterable[float]) -> float:
+    """Return the unit to which a factor of velocities is near; 0 for none."""
+    return next((unit for unit in units if abs(factor / unit - 1) <= table.RATE_OFF), 0.0)
 
 
 def velocity_factors(excerpt: Excerpt) -> dict[int, float]:
@@ -242,3 +253,117 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
                  for drive, joint in zip(drives, joints, strict=True)}
     return tuple((drives[k], key, names[drives[order[k]]][key]) for keys, order in moved
                  for k in reading.drives for key in keys if key in names[drives[order[k]]]), ''
+
+
+# ------------------------------------------------------------------ efforts and what they are
+
+
+def find_sign_bit(recording: Recording) -> Iterator[OtherReading]:
+    """Yield efforts that are magnitudes with a bit for their sign, as servos report loads."""
+    found: dict[int, list[int]] = {}
+    for d, column in enumerate(recording.effort.T):
+        effort = column[np.isfinite(column)]
+        if len(effort) < 2 or np.any(effort < 0) or np.any(effort % 1 != 0):
+            continue
+        rough = table.CALMER * np.abs(np.diff(effort)).sum()
+        for bit in table.SIGN_BITS:
+            if 0.02 < np.mean(effort >= 2.0 ** bit) < 0.98 and effort.max() < 2.0 ** (bit + 1) and (
+                    np.abs(np.diff(signed(effort, bit))).sum() < rough):
+                found.setdefault(bit, []).append(d)
+    for bit, group in found.items():
+        yield OtherReading.of(
+            'effort_sign_bit', recording.drives, group,
+            f'the effort of {named(recording.drives, tuple(group))} looks like a magnitude whose '
+            f'sign is bit {bit} ({2 ** bit})',
+            scales=tuple((recording.drives[d], 'effort_sign_bit', float(bit)) for d in group))
+
+
+def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evidence: Evidence,
+                  ) -> Iterator[OtherReading]:
+    """Yield efforts that are recorded without their sign."""
+    unsigned = []
+    for d in np.flatnonzero(evidence.size > table.WEAK * evidence.size.max()).tolist():
+        known = np.isfinite(excerpt.effort[:, d]) & np.isfinite(evidence.force).all(axis=1)
+        effort, force = excerpt.effort[known, d], evidence.force[known, d]
+        if np.any(recording.effort[:, d] < 0) or not np.any(effort):
+            continue
+        below = float(np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2))
+        if table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and table.CLEARLY * np.sum(
+                (effort - np.abs(force)) ** 2) < np.sum((effort - force) ** 2):
+            unsigned.append(d)
+    if unsigned:
+        yield OtherReading.of(
+            'effort_absolute', model.drives, unsigned,
+            f'the effort of {named(model.drives, tuple(unsigned))} looks like its absolute value: '
+            'it is never below 0, where the model changes sign; it must be recorded with its sign')
+
+
+# ------------------------------------------------------------------------------- measurements
+
+
+def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
+                         ) -> tuple[NoMeasurement, ...]:
+    """Return what efforts look like that are no measurement, a finding for each kind.
+
+    Parameters
+    ----------
+    model : DriveModel
+    contents : mapping of str to Shares
+        By drive; of a recording in the units and signs that it says.
+    """
+    if model.effort_kind in KINDS:
+        kind, noun = KINDS[model.effort_kind]
+        return (NoMeasurement.of(kind, model.drives, range(len(model.drives)), f'the efforts are '
+                                 f'{noun}, as the model file says with {EFFORT_KIND}: '
+                                 f'{model.effort_kind}'),)
+    kinds = {drive: content.kind for drive, content in contents.items()}
+    # What one drive shows certainly is true of all: they are recorded in the same way.
+    weighs = any(content.shows_gravity and not content.lacks_gravity
+                 for content in contents.values())
+    moves = any(content.inertia_doubt < table.LEAST_SHARE and not content.lacks_inertia
+                for content in contents.values())
+    excluded = ({table.WITHOUT_GRAVITY, table.EXTERNAL} if weighs else set()) | (
+        {table.COMMAND, table.POSITION_ERROR, table.EXTERNAL} if moves else set())
+    kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
+    return tuple(_finding(model, contents, [drive for drive in kinds if kinds[drive] == kind], kind)
+                 for kind in dict.fromkeys(kinds.values()) if kind)
+
+
+def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
+    """Return the finding for each drive whose effort is no measurement in one of the recordings."""
+    found: dict[str, NoMeasurement] = {}
+    for recording in recordings:
+        for finding in find_no_measurements(model, effort_contents(model, recording)):
+            found = {**dict.fromkeys(finding.drives, finding), **found}
+    return {drive: found[drive] for drive in model.drives if drive in found}
+
+
+def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence[str],
+             kind: str) -> NoMeasurement:
+    group = tuple(model.drives.index(drive) for drive in drives)
+    content = contents[drives[0]]
+    of = f'the effort of {named(model.drives, group)}'
+    gravity = f'gravity ({_amount(content.gravity, content.gravity_doubt)})'
+    inertia = f'inertia ({_amount(content.inertia, content.inertia_doubt)})'
+    beside = [gravity] * content.lacks_gravity + ['friction'] * (not content.has_friction)
+    lacks = f'{of} holds no {" nor ".join([inertia, *beside])}: it looks like'
+    what = {
+        table.WITHOUT_GRAVITY: f'{of} holds no {gravity}: it looks as if gravity was taken out '
+        'already; else a counterweight bears it, or the base stands otherwise than the model says',
+        table.EXTERNAL: f'{of} holds no {inertia} nor {gravity}: it looks like an external torque, '
+        'from which a model was taken out already',
+        table.NOISE_FREE: f'{of} holds no noise: it looks computed, not measured',
+        table.POSITION_ERROR: f'{of} is {content.compliance:.2g} times what the model says: it '
+        'looks like an error of position under the effort, or is in another unit'
+        if content.compliance else f'{lacks} an error of position, which grows with the velocity, '
+        'not like a measurement',
+        table.COMMAND: f'{lacks} what a controller commands, not like a measurement'}[kind]
+    line = {table.COMMAND: recorded_names.COMMANDED, table.EXTERNAL: kind,
+            table.WITHOUT_GRAVITY: kind}.get(kind)
+    return NoMeasurement.of(kind, model.drives, group, what,
+                            f'{EFFORT_KIND}: {line}' if line else '')
+
+
+def _amount(share: float, doubt: float) -> str:
+    # Adding 0 makes minus nothing nothing.
+    return f'{round(share, 2) + 0.0:.2f} ± {doubt:.2f} of what the model has'

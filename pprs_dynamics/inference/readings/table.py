@@ -69,11 +69,12 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
-UNNAMED = 6.0  # less, of amperes in columns without names
+# Less, of amperes in columns without names, and where nobody has checked the unit.
+UNNAMED, UNCHECKED = 6.0, 4.0
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
-OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
+OUTSIDE, FAR_OUTSIDE = 4.0, 12.0  # of positions beyond a stroke, and far beyond it
 BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed limit
 STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
