@@ -20,6 +20,8 @@ from pprs_dynamics.system.plain_text import displayed
 
 EXAMPLE = 'pprs init ur10e.urdf run.csv --output robot.yaml'
 FASTEST = 1e6  # [Hz]
+NOT_SURE = ('[bold]Not sure[/]: the lines are comments in the model file; write what is true, or '
+            'go on with --as-it-is')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,9 +57,7 @@ def run(options: argparse.Namespace) -> int:
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')
     if model.recorded.columns is None and first.questions:
-        screen.print('[bold]Not sure[/]: write one of these lines into the model file')
-        for line in first.questions:
-            screen.print(f'  {shown(line)}')
+        screen.print(NOT_SURE)
         return 1
     _, summaries = show_recordings(model, list(map(str, first.recordings)), None, screen)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
@@ -79,6 +79,5 @@ def run(options: argparse.Namespace) -> int:
             'recordings': [asdict(summary) for summary in summaries],
             'questions': first.questions})
     if first.questions:
-        screen.print('[bold]Not sure[/]: the lines are comments in the model file; write what is '
-                     'true, or go on with --as-it-is')
+        screen.print(NOT_SURE)
     return 1 if first.questions else 0
