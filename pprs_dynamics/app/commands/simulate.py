@@ -11,13 +11,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.simulate import RATE, simulate
-from pprs_dynamics.app.commands.arguments import (
-    UsageError,
-    number,
-    output_file,
-    seed,
-    tell,
-)
+from pprs_dynamics.app.commands.arguments import UsageError, number, output_file, seed, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion

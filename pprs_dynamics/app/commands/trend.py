@@ -47,16 +47,15 @@ def fleet_page(fleet: FleetTrends) -> Page:
     page.bullets(others)
     if changed:
         drawn = changed[:MOST_DRAWN]
-        figure = charts.rows_over_time(len(drawn), 80 + HEIGHT * len(drawn), showlegend=False)
+        figure = charts.rows_over_time(
+            len(drawn), 80 + HEIGHT * len(drawn), showlegend=False,
+            titles=[f'<b>{trend.robot}</b>, {trend.name} [{trend.unit}]' for trend in drawn])
         figure.update_xaxes(title_text='', ticksuffix='', hoverformat='%Y-%m-%d %H:%M')
         for row, trend in enumerate(drawn, start=1):
             figure.add_trace(charts.trace(
                 trend.time.dt.strftime('%Y-%m-%dT%H:%M:%S'), trend.value, trend.name,
                 charts.MODEL, mode='markers', hovertemplate=f'%{{y:.4g}} {trend.unit}'),
                 row=row, col=1)
-            figure.add_annotation(text=f'<b>{trend.robot}</b>, {trend.name} [{trend.unit}]',
-                                  x=0, y=1, xref='x domain', yref='y domain', xanchor='left',
-                                  yanchor='bottom', showarrow=False, row=row, col=1)
             for step in trend.steps:
                 figure.add_vline(x=f'{step.time:%Y-%m-%dT%H:%M:%S}', row=row, col=1,
                                  line={'color': charts.ERROR, 'dash': 'dash'})

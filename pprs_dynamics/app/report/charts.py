@@ -41,13 +41,13 @@ def figure(traces: Iterable[Any], height: int, **layout: Any) -> Any:
 
 
 def rows_over_time(count: int, height: int, heights: Sequence[float] | None = None,
-                   **layout: Any) -> Any:
-    """Return a figure of so many rows over one time axis [s], the shares of its height given."""
+                   titles: Sequence[str] = (), **layout: Any) -> Any:
+    """Return a figure of so many rows over one time axis [s]; `heights`: shares of its height."""
     plotly_objects()
     from plotly.subplots import make_subplots
 
     figure = make_subplots(rows=count, cols=1, shared_xaxes=True, vertical_spacing=0.06,
-                           row_heights=heights)
+                           row_heights=heights, subplot_titles=titles or None)
     figure.update_xaxes(**SECONDS)
     figure.update_xaxes(title_text='time [s]', row=count, col=1)
     figure.update_layout(height=height, **{'margin': MARGIN, 'legend': LEGEND, **layout})

@@ -31,8 +31,6 @@ from pprs_dynamics.inference.residuals.profiles import (
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 FINE_BINS = 24
-VARIABLES = ('velocity', 'position', 'acceleration', 'load', 'rod_angle', 'time', 'platform_x',
-             'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
 POINTS = 400  # of a curve, and of the errors around it
 # Of the variance of an effect, what means over bins of a variable must explain to draw it along it.
 LEAST_TELLING = 0.5
@@ -246,7 +244,7 @@ def effort_over_error(residuals: Residuals, drive: int, time: Array, efforts: Se
 def against_variables(residuals: Residuals, comparison: Comparison) -> list[tuple[Any, str]]:
     """Return mean error over bins of every variable with its uncertainty, and captions."""
     figures = []
-    for name in VARIABLES:
+    for name in UNITS:
         if residuals.variable(name, 0) is None:
             continue
         traces = []

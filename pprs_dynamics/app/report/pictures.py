@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.app.report import charts
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.reproduction import Reproduction
 from pprs_dynamics.system.files import new_file
@@ -28,7 +29,6 @@ BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = (
 # What noise explains is in the background; the rest in colours that stay apart in grey print.
 COLOURS = {'noise': '#BBBBBB', 'error': BLUE, 'before': BLUE, 'held out': RED}
 OTHERS = (ORANGE, GREEN, PURPLE, SKY)
-LINES = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 MOST_POINTS = 4000  # of a line; more than a picture has columns
 WIDTH, HEIGHT = 8.0, 3.0  # of a notebook's row [in]
 RESOLUTION, FILE_RESOLUTION = 100, 110  # dots per inch, in notebooks and in files
@@ -98,7 +98,7 @@ def plot_errors(errors: Mapping[str, Mapping[str, float]], unit: str, rows: int 
 def plot_series(axis: Any, time: ArrayLike, lines: Mapping[str, ArrayLike], label: str) -> None:
     """Draw lines over time [s]."""
     step = max(1, len(np.asarray(time)) // MOST_POINTS)
-    for colour, (name, values) in zip(cycle(LINES), lines.items(), strict=False):
+    for colour, (name, values) in zip(cycle(charts.LINES), lines.items(), strict=False):
         axis.plot(np.asarray(time)[::step], np.asarray(values)[::step], lw=0.9, color=colour,
                   label=name)
     axis.set(xlabel='time [s]', ylabel=label)

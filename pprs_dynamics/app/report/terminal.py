@@ -62,8 +62,7 @@ def stacked(*parts: Any) -> Any:
 
 def as_text(view: Any, width: int) -> str:
     """Return what the terminal would show, without colours."""
-    screen = console(force_jupyter=False)
-    screen.width = width
+    screen = console(force_jupyter=False, width=width)
     with screen.capture() as captured:
         screen.print(view)
     return str(captured.get()).rstrip('\n')
@@ -71,14 +70,10 @@ def as_text(view: Any, width: int) -> str:
 
 def as_html(view: Any, width: int) -> str:
     """Return what the terminal would show as HTML, with its colours."""
-    _rich('console')  # or says what is missing
-    from rich.console import Console
-
     # In a notebook rich would show it at once, too.
-    screen = Console(record=True, width=width, file=io.StringIO(), emoji=False,
-                     force_jupyter=False)
+    screen = console(record=True, width=width, file=io.StringIO(), force_jupyter=False)
     screen.print(view)
-    return screen.export_html(inline_styles=True, code_format=HTML)
+    return str(screen.export_html(inline_styles=True, code_format=HTML))
 
 
 def shell_command(command: str) -> Any:
