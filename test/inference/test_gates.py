@@ -83,7 +83,11 @@ def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() ->
     # Of a wrist that gains and a slide that hardly loses the sum in newtons or newton metres rises.
     assert case.objections(sure, (141.9, 141.91), 'the recordings', 'N or N m') == ()
     # Of several effects in joint values the error over all drives falls with the last.
-    assert replace(case, is_alone=False).objections(sure, (1.0, 1.2), 'the recordings', 'N') == ()
+    several = replace(case, is_alone=False)
+    assert several.objections(sure, (1.0, 1.2), 'the recordings', 'N') == ()
+    said, = several.objections(unsure, (1.0, 1.2), 'the recordings', 'N')
+    assert said.endswith('but weighted by the noise it falls by 0.5 standard errors, and more than '
+                         '1 are required')
     said, = case.objections(unsure, (1.0, 0.9), 'the recordings', 'N')
     assert 'falls from 1 N to 0.9 N, by 0.5 standard errors' in said
 

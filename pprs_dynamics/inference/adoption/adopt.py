@@ -190,9 +190,12 @@ class _Case:
         if gain.confirms(asked):
             return ()
         sure = gain.certainty
-        why = (f'but on {listed(gain.losing)} it certainly rises' if gain.losing else
-               f'but weighted by the noise it rises by {-sure:.2g} standard errors' if sure < 0 else
-               f'by {sure:.2g} standard errors, and more than {asked:g} are required')
+        link, weighted = ('but', '') if after < before else (
+            'and', 'but weighted by the noise it falls ')
+        why = (f'{link} on {listed(gain.losing)} it certainly rises' if gain.losing else
+               f'{link} weighted by the noise it rises by {-sure:.2g} standard errors'
+               if sure < 0 else
+               f'{weighted}by {sure:.2g} standard errors, and more than {asked:g} are required')
         return (f'{said}, {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,

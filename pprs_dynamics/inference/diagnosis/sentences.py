@@ -164,7 +164,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
               f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
               'Repeat the recording' for suspect in diagnosis.suspects),
-        tuple(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. It '
+        tuple(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. This set '
               f'{_cost(ranked)}'
               for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),

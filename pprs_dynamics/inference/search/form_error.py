@@ -99,7 +99,7 @@ class FormErrors:
             if size < least * allowed:
                 least = size / allowed
                 found = (f'{_in_words(candidate.name)} may be the form error of '
-                         f'{", ".join(map(_in_words, names))}',
+                         f'{" and ".join(map(_in_words, names))}',
                          fitted.without(candidate))
         return found
 
