@@ -19,7 +19,12 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import catalogue
 
 SWING, WIDTH = 1, 0.01  # the joint, and in which its friction reverses [rad/s]
 MOVED = motion(20.0)
@@ -86,6 +91,30 @@ def test_a_force_is_named_alone_with_its_size(
     assert named(found) == [(name, ('swing',))]
     for key, value in expected.items():
         assert values(found)[key] == pytest.approx(value, rel=0.05, abs=0.01 * (value < 1))
+
+
+def test_a_gear_loses_no_less_where_the_motor_drives(tmp_path: Path) -> None:
+    """Less loss there than driven back is a gain of all loads, which a mass explains as well."""
+    model, effect = real_arm(tmp_path), catalogue()['gear_efficiency']
+    component = Component.of(effect, SWING, {}, ('driving', 'driven_back'))
+    forces = model.drive_forces(MOVED)
+    fits = []
+    for losses in ((0.25, 0.1), (0.1, 0.25)):
+        effort = forces.total.copy()
+        effort[:, SWING] += gear(*losses)(forces.mechanism.transmitted[:, SWING])
+        recording = Recording.from_arrays('run', MOVED.time, MOVED.position, None, effort,
+                                          model.drives)
+        sets = FittedSets(Design.of(model, [recording]), DECISIONS)
+        fits.append(sets.evaluate((EffectCandidate.of([component]),)))
+    usual, impossible = fits
+    np.testing.assert_allclose(usual.coefficients(component), [0.25, 0.1], atol=0.03)
+    assert usual.terms.feasibility == 0
+    driving, driven_back = impossible.coefficients(component)
+    assert driving == pytest.approx(driven_back, rel=1e-6)
+    assert impossible.terms.feasibility > DECISIONS.rival_margin
+    # What is the same both ways is friction by load, which is fitted in its place.
+    assert impossible.form_of is not None
+    assert [candidate.name for candidate in impossible.form_of] == ['load_friction']
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])

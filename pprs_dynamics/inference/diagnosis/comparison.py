@@ -137,7 +137,7 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
                 refined.rows[drive_patterns.d][0] != 0) > MOST_SHARE:
             continue
         found = regression.fit([*blocks, *refined.blocks], near)
-        scored.append((fit.deviance - found.deviance - refined.prior_cost, refined, found))
+        scored.append((fit.deviance - found.deviance - refined.terms.total, refined, found))
     scored.sort(key=lambda scored: -scored[0])
     if not scored or scored[0][0] <= 0:
         return None

@@ -282,11 +282,6 @@ class UnknownCandidate:
     terms: CostTerms
 
     @property
-    def prior_cost(self) -> float:
-        """Of everything that was chosen."""
-        return self.terms.total
-
-    @property
     def name(self) -> str:
         """In lists of names of effects."""
         return f'unknown, {self.family.variable}'

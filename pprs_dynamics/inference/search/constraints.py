@@ -4,7 +4,8 @@
 """Constraints on the coefficients of a set: linear inequalities, solved at once.
 
 - Each parameter is within the bounds of its effect.
-- No drive has less than no inertia, viscous, dry or load friction, the model's own included.
+- No drive has less than no inertia, viscous, dry or load friction, the model's own included; no
+  gear loses less where its motor drives than where the load does.
 - An added body is a body, and a link from which one is taken away remains one.
 
 Inequalities of the first two kinds are linear. Possible bodies form a convex set, which tangent
@@ -188,6 +189,12 @@ class Constraints:
         rows, least = [unit, -unit], [bounds[0], -bounds[1]]
         totals: dict[tuple[int, Total], tuple[Array, float]] = {}
         for component, place in places.items():
+            for more, less in component.effect.at_least.items():
+                if {more, less} <= {*component.names}:
+                    order = np.zeros(len(component.names))
+                    order[[component.names.index(key) for key in (more, less)]] = 1.0, -1.0
+                    rows.append(order[None] @ unit[place])
+                    least.append(-order[None] @ _given(component))
             if (d := component.drive) is None:
                 continue
             for k, name in enumerate(component.names):

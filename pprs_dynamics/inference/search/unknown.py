@@ -230,7 +230,7 @@ class DrivePatterns:
                  if rank < count or (always and family.is_plain)]
         line = self.line(fit)
         if line is not None:
-            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.prior_cost))
+            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.terms.total))
         return sorted(found, key=lambda scored: -scored[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:

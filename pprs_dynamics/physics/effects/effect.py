@@ -286,6 +286,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         True where linear parameters below 0 are unphysical; of friction they always are.
     unphysical_below : mapping of str to float
         Lowest values of parameters that make a physical force; by default as `is_positive` says.
+    at_least : mapping of str to str
+        Parameters that are at least as large as another one in any machine.
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
     is_friction : bool
@@ -328,6 +330,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     scanned: ClassVar[tuple[str, ...]]
     is_positive: ClassVar[bool] = False
     unphysical_below: ClassVar[Mapping[str, float]] = {}
+    at_least: ClassVar[Mapping[str, str]] = {}
     may_be_measurement: ClassVar[bool] = False
     is_friction: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = False

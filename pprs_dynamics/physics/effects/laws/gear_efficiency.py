@@ -47,6 +47,9 @@ class GearEfficiency(DriveEffect):
     name = 'gear_efficiency'
     is_friction = True
     at_one_load = 'asymmetric_friction'
+    # A share of what the teeth carry: where the motor drives, that is the load and the loss. Less
+    # loss there than driven back is a gain of all loads, which takes on what a mass explains.
+    at_least: ClassVar[Mapping[str, str]] = {'driving': 'driven_back'}
     symmetric: ClassVar[Mapping[str, str]] = {
         'driving': 'load_friction', 'driven_back': 'load_friction'}
     linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
