@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from model_recordings import TIME, record, with_effects
+from single_axis import axis, axis_recording
 
 from benchmarks.hidden.recordings import Case, make_case
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -203,6 +204,19 @@ def test_a_drive_that_reverses_in_another_width_hides_no_friction() -> None:
 
 
 @pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('late', [0.06, -0.06])
+def test_efforts_that_belong_to_motion_in_a_gap_do_not_count(late: float) -> None:
+    run = axis_recording(axis({'time_delay': {'delay': late}}))
+    kept = np.all([np.abs(run.time - gap) > 0.15 for gap in (2.0, 3.7, 6.1)], axis=0)
+    found = diagnose(axis(), [Recording.from_arrays(
+        'cut', run.time[kept], run.position[kept], None, run.effort[kept], run.drives)])
+    assert found.verdict == 'effect'
+    (effect,) = found.effects
+    assert effect.name == 'time_delay'
+    assert effect.parameters['axis.delay'].value == pytest.approx(late, abs=0.001)
+    assert np.nanmax(np.abs(found.remaining)) < 5 * found.noise_floor
+
+
 def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -> None:
     late = with_effects(MODEL, {
         'time_delay': {f'{drive}.delay': 0.008 for drive in DRIVES},

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft
+from scipy import signal
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
@@ -67,12 +67,15 @@ def _delay(recording: FullRate, drive: int) -> float:
         recording.effort, recording.velocity, recording.direction, recording.acceleration)])
     columns -= columns.mean(axis=1, keepdims=True)
     columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
-    size = fft.next_fast_len(len(even) + most, real=True)
-    alike = fft.irfft(fft.rfft(seen - seen.mean(), size) * fft.rfft(columns, size).conj(), size)
-    lags = np.arange(-most, most + 1)
-    explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
-                          alike[:, lags])
-    return float(lags[np.argmax(explained)] * step)
+    columns = np.vstack((columns, np.full(len(even), len(even) ** -0.5)))
+    # The same efforts for every delay, which have a past and a future of all of them.
+    inner = seen[most:-most] - seen.mean()
+    alike = signal.correlate(columns, inner[None], 'valid', 'fft')
+    sums = np.cumsum(columns[:, None] * columns, axis=2)
+    sums = np.concatenate((np.zeros((*sums.shape[:2], 1)), sums), axis=2)
+    grams = (sums[..., len(inner):] - sums[..., :-len(inner)]).transpose(2, 0, 1)
+    explained = np.einsum('kl,lkm,ml->l', alike, np.linalg.pinv(grams, 1e-9, hermitian=True), alike)
+    return round(float((most - np.argmax(explained)) * step), 9)  # whatever the clock's origin
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,8 @@ class Reconstruction(DriveMotion):
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
-        As measured [N]; NaN where it was not, and where a drive stands whose effort then means
-        nothing.
+        As measured [N]; NaN where it was not, where a drive stands whose effort then means
+        nothing, and where it is late and of motion before its segment.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
     gain : (D,) array
@@ -120,6 +120,24 @@ class Reconstruction(DriveMotion):
         if model.gain is None:
             return np.ones_like(self.gain)
         return np.where(np.isfinite(self.gain), self.gain / np.asarray(model.gain), 1.0)
+
+    def with_known_past(self, delays: Array) -> Reconstruction:
+        """Return this without the efforts of motion that is not in their segment.
+
+        Parameters
+        ----------
+        delays : (D,) array
+            By which efforts are measured late; early where negative [s].
+        """
+        if not np.any(delays):
+            return self
+        effort = self.effort.copy()
+        for part, grid in zip(self.segments, self.grids, strict=True):
+            # A delay is known to half a step.
+            time, late = self.time[part, None], np.abs(delays) + grid.step / 2
+            effort[part][(delays > 0) & (time - time[0] < late)
+                         | (delays < 0) & (time[-1] - time < late)] = np.nan
+        return replace(self, effort=effort)
 
     def chunks(self, samples: int = CHUNK) -> Iterator[Chunk]:
         """Yield whole blocks of at most about `samples` samples, segment by segment."""
@@ -226,7 +244,7 @@ def reconstruct(
         **vars(drives), time=time, motion=motion, effort=effort,
         treat=Treatment(drives.block_starts, total), gain=gain,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
-        recorded=recording, read=read, windup=windup)
+        recorded=recording, read=read, windup=windup).with_known_past(model.lateness)
 
 
 def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction:

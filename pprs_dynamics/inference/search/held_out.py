@@ -106,6 +106,10 @@ def sample_gains(before: Residuals, after: Residuals) -> tuple[Array, Array]:
     before, after : Residuals
         Of two models on the same recordings.
     """
+    # One of them may show that some efforts are of motion before their segment.
+    known = np.isfinite(before.measured) & np.isfinite(after.measured)
+    before, after = (replace(each, measured=np.where(known, each.measured, np.nan))
+                     for each in (before, after))
     gains, sizes = np.zeros(before.error.shape), np.zeros(before.error.shape)
     counts = np.isfinite(before.measured).sum(axis=0)
     if counts.max() < LEAST_SAMPLES:

@@ -284,9 +284,12 @@ class MeasurementEffect(DriveEffect):
     ----------------
     not_linear_in : tuple of str
         Coefficients to which errors of positions are not in proportion.
+    late_by : str
+        Parameter by which efforts are measured late [s]; empty: at once.
     """
 
     is_measurement = True
+    late_by: ClassVar[str] = ''
     not_linear_in: ClassVar[tuple[str, ...]] = ()
     # Whether its errors of positions are smooth functions of the position alone.
     is_of_position: ClassVar[bool] = False

@@ -511,6 +511,13 @@ class DriveModel:
         return tuple(effect for effect in self.effects
                      if isinstance(effect, MeasurementEffect) and effect.shifts_positions())
 
+    @property
+    def lateness(self) -> Array:
+        """By how much efforts are measured late, (D,) [s]."""
+        return np.array([sum(effect.drives.get(drive, {}).get(effect.late_by, 0.0)
+                             for effect in self.effects if isinstance(effect, MeasurementEffect))
+                         for drive in self.drives])
+
     def position_error(self, position: Array) -> Array:
         """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
         errors = [e.position_error(self.drives, position) for e in self.misreadings]

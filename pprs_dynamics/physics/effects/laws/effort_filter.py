@@ -76,6 +76,7 @@ class EffortFilter(MeasurementEffect):
     """
 
     name = 'effort_filter'
+    late_by = 'time_constant'
     nonlinear = True
     shows_at_reversals = True
     assumed_at_start = 'the filter has settled at the first sample'

@@ -49,6 +49,7 @@ class TimeDelay(MeasurementEffect):
     """
 
     name = 'time_delay'
+    late_by = 'delay'
     assumed_at_start = 'the effort changed before the first sample as after it'
     nonlinear = True
     idealised = False
