@@ -30,7 +30,7 @@ copyright = f'2026 {author}'
 version = release = pprs_dynamics.__version__
 
 extensions = ['myst_nb', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
-exclude_patterns = ['*_text.md', 'example_effect/*.egg-info']
+exclude_patterns = ['example_effect/*.egg-info']
 html_theme = 'furo'
 html_title = f'pprs_dynamics {version}'
 html_static_path: list[str] = []

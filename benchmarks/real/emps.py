@@ -207,7 +207,7 @@ def draw(story: Story, path: Path) -> None:
 
 
 def main() -> None:
-    """Write the results and their picture."""
+    """Write the results and their picture; `docs/real_drive.py` copies the errors to the page."""
     folder = need_data('emps', IDENTIFICATION)
     story = tell(read_emps(folder / IDENTIFICATION), read_emps(folder / PULSES), print)
     draw(story, DOCS / 'images' / 'real_drive.png')
