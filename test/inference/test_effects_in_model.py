@@ -153,6 +153,18 @@ def test_adopt_sets_what_is_otherwise_and_the_way_back_is_exact() -> None:
     assert without_last_step(after.values)[0] == given.values
 
 
+def test_adopt_retains_what_the_recording_shows_though_no_single_parameter_is_sure() -> None:
+    """A few samples are slow enough: force and velocity are known together only."""
+    given = axis({'stribeck_friction': {'force': 3.0, 'velocity': 0.05}})
+    recording = axis_recording(axis({'stribeck_friction': {'force': 1.2, 'velocity': 0.01}}))
+    adoption = adopt(given, EffectRequest(CATALOGUE['stribeck_friction']), [recording])
+    assert adoption.adopted
+    assert adoption.parameters['axis.force'].value < 2 * adoption.parameters['axis.force'].std
+    assert adoption.after.values['effects.stribeck_friction.axis.force'] == pytest.approx(
+        1.2, rel=0.2)
+    assert not any('removed' in remark for remark in adoption.remarks)
+
+
 def test_adopt_takes_out_what_nothing_is_left_of() -> None:
     """One of two drives, then the effect; not what another effect of the model is."""
     there: Effects = {'coulomb_friction': {'slide_2.force': 0.4, 'lift_1.force': 0.3},

@@ -11,7 +11,7 @@ several effects in the values that they have together, that error may fall with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,7 +45,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
-from pprs_dynamics.physics.effects.structure_effect import AddedBody, StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import EFFORT_UNITS
 from pprs_dynamics.physics.model.ledger import original_values
@@ -55,7 +55,7 @@ from pprs_dynamics.system.plain_text import for_json
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
-SURE = 2.0  # standard deviations by which a number must differ from 0
+SURE = 2.0  # standard errors by which the error must rise without what remains in a model
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
 
@@ -379,38 +379,45 @@ def requested_model(answer: Answer, effects: Sequence[FoundEffect],
             if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
     for effect in effects:
         gone = _gone(answer, effect)
-        removed = tuple(f'{block}.{effect.name}.{place}' for block in ('effects', UNCERTAINTIES)
-                        for place in gone)
-        values = {key: value for key, value in values.items()
-                  if not (removed and key.startswith(removed))}
-        if not any(key.startswith(f'effects.{effect.name}.') for key in values):
-            values['effects.active'] = [name for name in values['effects.active']
-                                        if name != effect.name]
+        values = _without(values, effect.name, gone)
     return replace(DriveModel.from_parameters(values), source=model.source), gone
+
+
+def _without(values: Mapping[str, Any], name: str, places: Sequence[str]) -> dict[str, Any]:
+    """Return the values of a model without an effect in some places, as the beginnings of keys."""
+    removed = tuple(f'{block}.{name}.{place}' for block in ('effects', UNCERTAINTIES)
+                    for place in places)
+    found = {key: value for key, value in values.items()
+             if not (removed and key.startswith(removed))}
+    if not any(key.startswith(f'effects.{name}.') for key in found):
+        found['effects.active'] = [other for other in found['effects.active'] if other != name]
+    return found
 
 
 @outside_cost('adopt removes an effect of the model of which the recordings show none')
 def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
-    """Return where the input model has the effect and the recordings show none of it.
+    """Return where the input model has the effect and the error is no larger without it.
 
-    As the beginnings of keys: `drive.`, `link.`, or '' for all of it.
+    As the beginnings of keys: `drive.`, `link.`, or '' for all of it. Not by the deviations of
+    single parameters: of breakaway force and Stribeck velocity only both together may be known.
     """
     effect, design = found.effect, answer.design
     candidate = next(c for c in answer.fitted.effects if c.name == effect.name)
-    sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
-        p.name.endswith('mass') or not issubclass(effect, AddedBody))}
-    prefixes = []
+    with_it = replace(answer.given, measured=answer.remaining,
+                      model=np.zeros_like(answer.remaining))
+    places = []
     for component in candidate.components:
         if design.present(effect, component.drive) is None:
             continue
-        places = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
-        prefix = (f'{design.drives[component.drive]}.' if component.drive is not None
-                  else ''.join(f'{place}.' for place in places))
-        mine = [number for key, number in found.parameters.items()
-                if key.startswith(prefix) and effect.place_and_parameter(key)[1] in sizes]
-        if mine and all(abs(number.value) <= SURE * number.std for number in mine):
-            prefixes.append(prefix)
-    return tuple(prefixes)
+        inner = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
+        place = (f'{design.drives[component.drive]}.' if component.drive is not None
+                 else ''.join(f'{each}.' for each in inner))
+        less = DriveModel.from_parameters(_without(answer.adopted.values, effect.name, [place]))
+        less_force = design.exact_forces(answer.adopted) - design.exact_forces(less)
+        without = replace(with_it, measured=answer.remaining + less_force)
+        if not predictive_gain(without, with_it).confirms(SURE):
+            places.append(place)
+    return tuple(places)
 
 
 def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,

@@ -5,7 +5,8 @@
 
 The noise is estimated with all columns at once, as Mallows' C_p takes the variance of the largest
 model: every effect of the catalogue. The restricted likelihood counts the degrees of freedom that
-they use. All commands print this number, and all residuals are judged by it.
+they use. In a short recording that is an upper estimate. An answer takes the noise of its set
+where that is lower beyond the accuracy (`noise_at_most`); `compare` has no set, and prints this.
 
 References
 ----------
