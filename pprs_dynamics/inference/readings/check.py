@@ -360,7 +360,8 @@ class Search:
 
     def _explains(self, fit: Fit) -> bool:
         """Whether hardly anything may be explained better."""
-        return fit.most_left < table.CLOSE_FIT and fit.prior < self.plausible
+        close = table.CLOSEST_FIT if self.is_first else table.CLOSE_FIT
+        return fit.most_left < close and fit.prior < self.plausible
 
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
                      alone: Callable[[int, Sequence[float]], float],

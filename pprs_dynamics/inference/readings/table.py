@@ -80,7 +80,8 @@ STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
 BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the given one
-CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
+# Residual of every drive with which no other reading is tried, and where nobody has checked units.
+CLOSE_FIT, CLOSEST_FIT = 2e-3, 6e-4
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
 WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
