@@ -73,11 +73,10 @@ def run(folder: Path) -> None:
             shutil.copyfile(data / name, name)
     if not Path('psm.yaml').exists():
         Path('psm.yaml').write_text(model_text())
-    # The masses of the URDF are guesses: the checks of mounting and units take them for mistakes.
     if not Path('base.yaml').exists():
-        main(['fit', FREE, '--model', 'psm.yaml', '--as-it-is', '--output', 'base.yaml'])
+        main(['fit', FREE, '--model', 'psm.yaml', '--output', 'base.yaml'])
     if not Path('full.yaml').exists():
-        main(['diagnose', FREE, '--model', 'base.yaml', '--as-it-is', '--adopt-all',
+        main(['diagnose', FREE, '--model', 'base.yaml', '--adopt-all',
               '--output', 'full.yaml'])
     for name in LOADED:
         if not Path(f'{name}.json').exists():

@@ -37,6 +37,7 @@ from pprs_dynamics.inference.readings.findings import (
     near,
     velocity_factors,
 )
+from pprs_dynamics.inference.readings.names import is_share
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -162,16 +163,19 @@ class Search:
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any, the more so where no name says that a column is an effort.
-        names = [] if model.recorded.columns is None else [
-            drive.names.get('effort') for drive in model.recorded.columns.drives.values()]
-        is_unnamed = efforts is not None or any(isinstance(name, int) for name in names)
+        columns = [] if model.recorded.columns is None else [
+            *model.recorded.columns.drives.values()]
+        is_unnamed = efforts is not None or any(
+            isinstance(drive.names.get('effort'), int) for drive in columns)
         self.cost_of_constants = table.COST['drive_constant'] - (
             table.UNNAMED if is_unnamed else table.UNCHECKED if is_first else 0.0)
         self.is_first = is_first or efforts is not None
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
-        # Of currents without a known gain no force is known: masses and units say nothing.
-        self.has_gain = model.effort_kind != CURRENT or model.knows_currents
+        # Of currents without a known gain, and shares of an unknown torque, no force is known:
+        # masses and units say nothing.
+        self.has_gain = (model.effort_kind != CURRENT or model.knows_currents) and not any(
+            map(is_share, columns))
         self.masses = table.MASSES if self.has_gain else np.inf
         # Recorded velocities over the derivatives of positions.
         self.factors = velocity_factors(self.excerpts[1.0]) if 1.0 in self.excerpts else {}
@@ -425,7 +429,7 @@ class Search:
     def _weights(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> Array:
         """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
         effort = np.sqrt(np.mean(np.nan_to_num(excerpt.effort[:, reading.efforts]) ** 2, axis=0))
-        moves = evidence.speed > self.model.reversal.velocity
+        moves = evidence.moves(self.model)
         sizes = np.maximum(effort / max(effort.max(), 1e-300),
                            evidence.size / max(evidence.size.max(), 1e-300))
         found = np.where((sizes > table.WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
@@ -442,7 +446,7 @@ class Search:
             return evidence is not None
         weights, votes = self._weights(
             reading, self.excerpts[reading.time_unit], evidence), 0.0
-        moves = evidence.speed > self.model.reversal.velocity
+        moves = evidence.moves(self.model)
         for d in np.flatnonzero((reading.effort_scale < 0) & moves).tolist():
             column = int(reading.efforts[d])
             if evidence.is_measured(d, column):

@@ -16,7 +16,7 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.check import Fit, Search
-from pprs_dynamics.inference.readings.findings import columns_line
+from pprs_dynamics.inference.readings.findings import columns_line, near
 from pprs_dynamics.inference.readings.links import (
     Layout,
     Links,
@@ -150,7 +150,7 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     else:
         count = max((len(each.values) for each in left), default=0)
         stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
-        columns, found = _by_numbers(left, joints, stamps, time is not None or rate is not None,
+        columns, found = _by_numbers(left, joints, stamps, time is not None, rate is not None,
                                      stamp, notes, model), []
     notes += found
     main = quantity or POSITION
@@ -311,7 +311,7 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
 
 
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, has_times: bool,
-                stamp: Columns, notes: list[str], model: DriveModel) -> Columns:
+                has_rate: bool, stamp: Columns, notes: list[str], model: DriveModel) -> Columns:
     """Return columns without names: positions by derivatives, efforts by what explains them."""
     count, values = len(joints), np.column_stack([each.values for each in series])
     found = layouts(values, time, [units.turns for units in model.units])
@@ -331,27 +331,31 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
         found = found[:1]
     fits: list[tuple[Fit, Layout, list[int]]] = []
     for layout in found:
-        stamps = time if has_times or not layout.velocities else time / layout.rate
-        fits += [(fit, layout, group) for fit, group in _fits(model, values, stamps, layout)]
+        # Velocities say at which rate they are the derivatives: a rate that is given may be wrong.
+        says_rate = not has_times and layout.velocities and not (
+            has_rate and near(layout.rate, (1.0, *table.VELOCITY_UNITS)))
+        for stamps in [time] * (has_times or has_rate or not layout.velocities) + (
+                [time / layout.rate] if says_rate else []):
+            fits += [(fit, layout, group) for fit, group in _fits(model, values, stamps, layout)]
         # Hardly anything explains efforts as well by chance.
         if any(fit.most_left < table.EXPLAINED and fit.prior < table.PLAUSIBLE
                for fit, _, _ in fits):
             break
     fits.sort(key=lambda each: -each[0].score)
-    near = [each for each in fits if each[0].score > fits[0][0].score - table.SURE]
+    likely = [each for each in fits if each[0].score > fits[0][0].score - table.SURE]
     # Of positions that explain as much the smoothest, as no effort is.
-    layout = min([each[1] for each in near] or found[:1],
+    layout = min([each[1] for each in likely] or found[:1],
                  key=lambda layout: roughness(values[:, layout.positions]))
-    near = [each for each in near if each[1] is layout]
-    efforts = [group for *_, group in near]
-    rivals = [each for each in near if not move_alike(values, efforts[0], each[2])]
-    if near and near[0][0].left > table.GOOD_FIT:
-        rivals += [each for each in fits if each is not near[0]]
+    likely = [each for each in likely if each[1] is layout]
+    efforts = [group for *_, group in likely]
+    rivals = [each for each in likely if not move_alike(values, efforts[0], each[2])]
+    if likely and likely[0][0].left > table.GOOD_FIT:
+        rivals += [each for each in fits if each is not likely[0]]
     if rivals:
-        raise AmbiguousColumns(joints, [read(of, group) for _, of, group in (near[0], rivals[0])],
+        raise AmbiguousColumns(joints, [read(of, group) for _, of, group in (likely[0], rivals[0])],
                                'two readings of the columns are as likely')
-    if not efforts or (near[0][0].least_left < table.NO_EFFORT < near[0][0].most_left
-                       and not near[0][0].is_rigid):
+    if not efforts or (likely[0][0].least_left < table.NO_EFFORT < likely[0][0].most_left
+                       and not likely[0][0].is_rigid):
         used = [*layout.positions, *layout.velocities]
         _ask_for_one(joints, read(layout), [
             each.column for place, each in enumerate(series) if place not in used])

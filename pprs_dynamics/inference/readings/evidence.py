@@ -11,6 +11,7 @@ from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from pprs_dynamics.arrays import Array
@@ -59,6 +60,8 @@ class Evidence:
         Root mean squares of the model's forces, and of velocities.
     force : (N, D) array
         Of the model; NaN where the mechanism cannot follow.
+    balance : (D,) array
+        Weights of the bodies on a drive, as the root of their sum of squares, over their sum.
     """
 
     roots: Array
@@ -68,6 +71,7 @@ class Evidence:
     size: Array
     speed: Array
     force: Array
+    balance: Array
 
     @classmethod
     def of(cls, model: DriveModel, excerpt: Excerpt, reading: Reading | None = None,
@@ -117,7 +121,8 @@ class Evidence:
         swing = squares - gram[..., CONSTANT, EFFORT] ** 2 / np.maximum(samples, 1)
         force = forces.sum(axis=0)
         return cls(roots, samples, squares, np.maximum(swing, 0.0) + table.WEAK ** 2 * squares,
-                   np.sqrt(np.nanmean(force ** 2, axis=0)), speed, force)
+                   np.sqrt(np.nanmean(force ** 2, axis=0)), speed, force,
+                   _balance(model, position[followed.all(axis=1)]))
 
     @property
     def has_weight(self) -> bool:
@@ -125,6 +130,13 @@ class Evidence:
         size = np.linalg.norm(self.roots[..., GRAVITY], axis=-1)
         rest = np.linalg.norm(self.roots[..., INERTIA], axis=-1)
         return bool(np.any(size > table.WEAK * rest))
+
+    def moves(self, model: DriveModel) -> NDArray[np.bool_]:
+        """Return which drives are faster than friction holds them, (D,) bool.
+
+        A wide reversal may be that of cables or gears, which move within it.
+        """
+        return np.asarray(self.speed > np.minimum(model.reversal.velocity, table.RESTING))
 
     def is_measured(self, drive: int, column: int) -> bool:
         """Whether there are enough efforts for a regression."""
@@ -134,17 +146,20 @@ class Evidence:
         """Return the log-likelihood that efforts are `scale` times those of a drive.
 
         Inertia and gravity are the model's within a relative tolerance of its masses, friction
-        opposes the motion with any size, and a constant is small in comparison.
+        opposes the motion with any size, and a constant is small in comparison. The weight of
+        bodies that balance each other may be any, of either sign: each has its own error.
         """
         root = self.roots[drive, column]
         count, total, swing = (float(each[drive, column]) / (1.0 if k == 0 else scale ** 2)
                                for k, each in enumerate((self.count, self.total, self.swing)))
-        matrix = np.column_stack([root[:, :EFFORT], -root[:, CONSTANT]])
+        matrix = np.column_stack([root[:, :EFFORT], -root[:, CONSTANT],
+                                  root[:, GRAVITY], -root[:, GRAVITY]])
         target = root[:, EFFORT] / scale
         # Coefficients in units of the model's forces: mean and standard deviation of each.
-        mean = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        mean = np.array([1.0, 1.0, *[0.0] * 7])
         constant = table.CONSTANT * np.sqrt(total / count)
-        width = np.array([masses, masses, np.inf, np.inf, np.inf, constant, constant])
+        apart = max(table.SAME_BALANCE, masses * float(np.sqrt(self.balance[drive] ** 2 - 1)))
+        width = np.array([masses, masses, *[np.inf] * 3, *[constant] * 2, *[apart] * 2])
         variance = total / count
         for _ in range(3):
             weight = np.sqrt(variance * count / table.SAMPLES) / width
@@ -183,6 +198,23 @@ class Evidence:
             columns.append(root[:, CONSTANT])
         factors, doubts, _ = fitted(root[:, EFFORT], columns)
         return factors[0] if abs(factors[0]) > table.CERTAIN * doubts[0] else np.nan
+
+
+def _balance(model: DriveModel, position: Array) -> Array:
+    """Return the weights of bodies on each drive, (D,), over their sum; at least 1."""
+    robot = model.robot
+    if robot.structure is None or not len(position):
+        return np.ones(len(model.drives))
+    some = position[::max(1, len(position) // table.LEAST_MEANS)]
+    try:
+        columns = robot.regressor(some, np.zeros_like(some), np.zeros_like(some))
+    except PprsError:
+        return np.ones(len(model.drives))
+    weights = np.sum(columns.reshape(*some.shape, *robot.inertial.shape) * robot.inertial, axis=3)
+    all_of_them = np.sum(np.sum(weights, axis=2) ** 2, axis=0)
+    balance: Array = np.sqrt(np.maximum(np.sum(weights ** 2, axis=(0, 2)) / np.where(
+        all_of_them > 0, all_of_them, np.inf), 1.0))
+    return balance
 
 
 def _is_steady(root: Array, force: Array) -> bool:
@@ -284,7 +316,10 @@ class Shares:
         found, doubts, left = fitted(effort, [*parts, ones])
         share, doubt = found[1], doubts[1]
         if _is_steady(root, parts[1]):
-            # A weight that hardly changes cannot be separated from a constant: it is one.
+            # A weight that hardly changes cannot be separated from constants, and is one with the
+            # model's own: a fit writes either.
+            constant = fitted(root[:, OTHERS], [*parts[2:], ones])[0][2]
+            parts[1] = parts[1] + constant * ones
             alone, alone_doubts, _ = fitted(effort, parts)
             share, doubt = alone[1], alone_doubts[1]
         viscous, dry = found[2] * parts[2], found[3] * parts[3]
@@ -354,10 +389,10 @@ def effort_contents(model: DriveModel, recording: Recording, evidence: Evidence 
             model, excerpt)
     if evidence is None:
         return {}
-    width = np.broadcast_to(model.reversal.velocity, (len(model.drives),))
+    moves = evidence.moves(model)
     return {drive: Shares.of(evidence, d, d, _fast_noise(recording, d))
             for d, drive in enumerate(model.drives)
-            if evidence.count[d, d] >= table.LEAST_MEANS and evidence.speed[d] > width[d]
+            if evidence.count[d, d] >= table.LEAST_MEANS and moves[d]
             and np.ptp(recording.effort[np.isfinite(recording.effort[:, d]), d]) > 0}
 
 

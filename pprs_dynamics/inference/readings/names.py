@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from pprs_dynamics.drives import Column
+from pprs_dynamics.drives import Column, DriveColumns
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
 from pprs_dynamics.measurement.files.samples import Series
@@ -136,3 +136,10 @@ def scale_of(title: str, quantity: str) -> float | None:
     unit = unit_of(title)
     return unit[1] if unit and unit[1] != 1 and (
         unit[0] == quantity or (unit[0] == table.SHARE and quantity == EFFORT)) else None
+
+
+def is_share(columns: DriveColumns) -> bool:
+    """Return whether efforts are read as a share of what no one has said."""
+    title = columns.names.get(EFFORT)
+    return isinstance(title, str) and f'<{table.SHARE}>' in words_of(title) and (
+        columns.effort_scale in (1.0, scale_of(title, EFFORT)))

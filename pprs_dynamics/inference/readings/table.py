@@ -56,6 +56,7 @@ SAMPLES = 12.0
 CLOSEST = 2e-4
 # Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
 MASSES, MASSES_MOST = 0.35, 7.0
+SAME_BALANCE = 1e-3  # standard deviation of the weight of a single body beside its mass
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
 # Width in which friction turns over, as a share of a drive's root mean square of velocity.
@@ -84,6 +85,7 @@ BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the 
 CLOSE_FIT, CLOSEST_FIT = 2e-3, 6e-4
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
+RESTING = 0.01  # [rad/s, m/s] speed from which a drive moves, however wide friction turns over
 WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
 
 # ------------------------------------------------------------------------- scales of efforts
