@@ -12,7 +12,7 @@ import pytest
 from model_recordings import TIME, record, with_effects
 from single_axis import axis, axis_recording
 
-from benchmarks.hidden.recordings import Case, make_case
+from benchmarks.hidden.recordings import Case, Scene, make_case
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -20,7 +20,9 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.experiments.motion_design import platform_motion
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.sensitivities import BY_FRICTION, Sensitivities
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
@@ -88,6 +90,17 @@ def test_columns_of_drives_are_what_the_model_with_the_effect_says(
     expected = weights @ rows
     np.testing.assert_allclose(found[:, 4], expected, atol=1e-3 * np.abs(expected).max())
     assert np.abs(found[:, [0, 1, 2, 3, 5]]).max() < 1e-12
+
+
+def test_friction_that_follows_its_own_loads_is_a_column_and_no_effect() -> None:
+    """The engine's friction of passive joints is in the loads that friction follows."""
+    scene = Scene(5, width=1.0, duration=4.0)
+    model = DriveModel.from_parameters({**scene.model.values, **scene.robot})
+    forces, samples = model.drive_forces(scene.platform), len(scene.platform)
+    columns = Sensitivities(model, model).columns(forces, Treatment(np.arange(samples), samples))
+    wanted = scene.plain.effort - forces.total
+    assert np.abs(wanted).max() > 0.01
+    np.testing.assert_allclose(columns[BY_FRICTION][:, 0], wanted, atol=2e-4)
 
 
 @pytest.mark.parametrize('late', [0.0, -0.11])

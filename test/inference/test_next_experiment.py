@@ -32,6 +32,7 @@ from pprs_dynamics.inference.experiments.next_experiment import (
 )
 from pprs_dynamics.inference.experiments.question import FittedTerm, Information, whitened
 from pprs_dynamics.inference.regression.base_columns import (
+    LoadOfFriction,
     ModelNumber,
     PresentParameter,
     ReversalShape,
@@ -136,7 +137,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
     assert {type(column) for column in information.base} == {
-        ModelNumber, ReversalShape, PresentParameter}
+        LoadOfFriction, ModelNumber, ReversalShape, PresentParameter}
 
 
 def test_white_noise_counts_samples() -> None:

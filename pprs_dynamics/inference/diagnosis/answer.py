@@ -37,11 +37,11 @@ from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import Estimates, averaged, calibrations, estimate
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.fitted_model import (
+    friction_forms,
     linear_error,
     linear_residual,
     model_at,
     parts_of,
-    reversal_forces,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import (
@@ -226,10 +226,10 @@ class Answer:
     def _above_noise(self) -> dict[str, float]:
         """Return the drives with more residual than noise and forms explain, over the noise.
 
-        Every fit takes widths of reversal as unknown, so that they are part of the explanation.
+        Every fit takes forms of friction as unknown, so that they are part of the explanation.
         The form error is a share of the sum of forces: two that cancel are no force of a machine.
         """
-        found, residual = {}, self.remaining - reversal_forces(self.fits, self.fitted)
+        found, residual = {}, self.remaining - friction_forms(self.fits, self.fitted)
         forms = sum((self.force(candidate) for candidate in self.fitted.effects
                      if candidate.effect.idealised), np.zeros_like(residual))
         for d in self.fits.regression.drives:

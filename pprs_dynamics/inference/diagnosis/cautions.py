@@ -12,8 +12,9 @@ import numpy as np
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.inference.regression.base_columns import ReversalShape
 from pprs_dynamics.inference.search.candidates import CandidateSet
-from pprs_dynamics.inference.search.fitted_model import reversal_forces
+from pprs_dynamics.inference.search.fitted_model import friction_forms
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -65,7 +66,7 @@ def _motion(fits: FittedSets) -> Iterator[str]:
 def _reversals(fits: FittedSets, best: CandidateSet, noise_levels: Mapping[str, float],
                ) -> Iterator[str]:
     """Yield the drives whose friction reverses in another width than the model's."""
-    forces = reversal_forces(fits, best)
+    forces = friction_forms(fits, best, ReversalShape)
     wrong = [fits.design.drives[d] for d in fits.regression.drives
              if root_mean_square(forces[:, d]) > noise_levels[fits.design.drives[d]]]
     if wrong:

@@ -69,13 +69,23 @@ class ModelNumber(BaseColumn):
 
 
 @dataclass(frozen=True)
-class ReversalShape(BaseColumn):
+class FrictionForm(BaseColumn):
+    """What the model's friction may do otherwise without another number."""
+
+    in_model = False
+
+
+@dataclass(frozen=True)
+class LoadOfFriction(FrictionForm):
+    """Friction that follows the loads by friction of passive joints, too: a coefficient of 1."""
+
+
+@dataclass(frozen=True)
+class ReversalShape(FrictionForm):
     """Friction that turns over otherwise than the model's; `drive` None: in passive joints.
 
     `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`.
     """
-
-    in_model = False
 
     drive: int | None
     number: int

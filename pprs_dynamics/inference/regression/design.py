@@ -26,6 +26,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     SMALL_STEP,
     BaseColumn,
     CarriedOver,
+    LoadOfFriction,
     ModelNumber,
     PresentParameter,
     ReferenceDirection,
@@ -37,6 +38,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.drive_ranges import SecondEncoders, drive_range
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
+    BY_FRICTION,
     DRIVE_WIDTHS,
     HOMING,
     INERTIA,
@@ -216,7 +218,8 @@ class Design:
                    for effect in effects):
             kept.add(NUMBERS)
             if all(issubclass(effect, DriveEffect) for effect in effects):
-                kept |= self.columns.keys() - ({OF_DRIVES, OF_JOINTS} if turning else set())
+                kept |= self.columns.keys() - (
+                    {OF_DRIVES, OF_JOINTS, BY_FRICTION} if turning else set())
         return {name: column for name, column in self.columns.items() if name in kept}
 
     def beside(self, carried: CarriedOver | None) -> Design:
@@ -401,6 +404,7 @@ class Design:
         base += [ReversalShape(_rows(column), 1.0, None, number)
                  for number, column in enumerate(stacked.get(OF_JOINTS, ()))
                  if is_open(None, number, column)]
+        base += [LoadOfFriction(_rows(column), 1.0) for column in stacked.get(BY_FRICTION, ())]
         for effect in given.effects:
             if isinstance(effect, (DriveEffect, StructureEffect)):
                 base += [replace(column, rows=design.present_rows(column))

@@ -24,11 +24,12 @@ from pprs_dynamics.measurement.motion.treatment import Treatment, bandwidth
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import PASSIVE_FRICTION, Forces
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.model.keys import GAIN
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -47,7 +48,7 @@ PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
 INERTIA = 'inertia'
-OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
+OF_DRIVES, OF_JOINTS, BY_FRICTION = 'drive widths', 'passive widths', 'loads by friction'
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,7 @@ class Sensitivities:
         - `OF_DRIVES`: other widths of reversal in every drive, and a part that is the same in
           both directions.
         - `OF_JOINTS`: other widths of reversal in all passive joints.
+        - `BY_FRICTION`: friction that follows the loads by friction of passive joints, too.
         - `HOMING`: per metre that each drive is measured too far.
         - `INERTIA`: per acceleration that each drive is measured too much.
         - Names of `searched`: the coefficients of each effect.
@@ -190,8 +192,11 @@ class Sensitivities:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
                 np.multiply.outer(DRIVE_WIDTHS, self.model.reversal.velocity)))
-            for friction in (e for e in following(self.model) if e.name == PASSIVE_FRICTION):
-                columns[OF_JOINTS] = samples.treated([*passive_reversal_columns(friction, state)])
+            for friction in self.model.effects:
+                if isinstance(friction, ModelJointFriction):
+                    columns[OF_JOINTS] = samples.treated(
+                        [*passive_reversal_columns(friction, state)])
+                    columns[BY_FRICTION] = samples.treated(self._under_friction(friction, state))
         if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
                 replace(slow, sensors=[]).interpolated, self._of_misreadings(slow.nodes))
@@ -207,6 +212,15 @@ class Sensitivities:
             else:
                 columns[name] = samples.treated(self._of_forces(effect, state))
         return columns
+
+    def _under_friction(self, friction: ModelJointFriction, state: Any) -> list[Array]:
+        """Return what friction changes if it follows the loads that friction adds, (N, D) [N]."""
+        load = state.robot.load_of_friction(state, friction.table(state.robot, state.reversal))
+        if load is None:
+            return []
+        loaded = state.with_load(state.robot, load)
+        return [self._efforts(self.model, loaded) - loaded.rigid_force
+                - self._own_efforts(state) + state.rigid_force]
 
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""

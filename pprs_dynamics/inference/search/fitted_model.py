@@ -13,7 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
-    ReversalShape,
+    FrictionForm,
     force_of,
     move_numbers,
     units_of,
@@ -115,11 +115,15 @@ def linear_residual(fits: FittedSets, fitted: CandidateSet) -> Array:
     return fits.regression.residuals.measured - linear_prediction(fits, fitted)
 
 
-def reversal_forces(fits: FittedSets, fitted: CandidateSet) -> Array:
-    """Return what friction that reverses in other widths than the model's changes, (M, D) [N]."""
+def friction_forms(fits: FittedSets, fitted: CandidateSet,
+                   kind: type[FrictionForm] = FrictionForm) -> Array:
+    """Return what another form of the model's friction changes, (M, D) [N].
+
+    Of one kind, such as the width in which it reverses.
+    """
     fit, design = fitted.fit, fits.design
     found = force_of(design.base, fit.coefficients, design.residuals.model.shape,
-                     lambda column: isinstance(column, ReversalShape))
+                     lambda column: isinstance(column, kind))
     for blocks in fitted.nuisance.values():
         if REVERSAL in blocks:
             for d, rows in blocks[REVERSAL].rows.items():

@@ -337,6 +337,9 @@ class Mechanism:
         """Return what the drives' gears carry [N m, N], (N, D)."""
         return np.abs(state.transmitted)
 
+    def load_of_friction(self, state: MechanismState, joints: JointFriction) -> None:
+        """Return None: what friction of passive joints adds to the loads is neglected."""
+
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
         return replace(state, position=position, acceleration=acceleration, known=None,

@@ -596,6 +596,19 @@ class ThreePprs:
         load: Array = state.reactions.guide_load
         return load
 
+    def load_of_friction(self, state: MechanismState, joints: Joints) -> StructureLoad:
+        """Return friction of passive joints as a load on the platform and the rods, Eq. (9).
+
+        The paper takes the reactions for friction without it, so that friction does not follow.
+        """
+        k_r, k_s = state.reactions.resistances(joints)
+        delta, u_dot = np.asarray(self.geometry.chain_angles), state.links.u_dot
+        axes = np.stack((-np.sin(delta), np.cos(delta), np.zeros(3)), axis=1)  # n_i
+        omega = state.tool_velocity[:, 3:]
+        moment = k_s.sum(axis=1)[:, None] * omega - (k_s * u_dot) @ axes
+        return StructureLoad(np.hstack((np.zeros_like(moment), moment)), {
+            REVOLUTE: k_r * u_dot + k_s * (u_dot - omega @ axes.T)})
+
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
         if position is state.position:
