@@ -23,7 +23,6 @@ from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import MechanismEngine
-from pprs_dynamics.simulation.export.exported_robot import BALLS, HINGES, RODS
 from pprs_dynamics.simulation.injected_forms import (
     CROSSED,
     FORMS,
@@ -41,7 +40,6 @@ from pprs_dynamics.simulation.injected_forms import (
     read_thermometers,
     tilted,
 )
-from pprs_dynamics.simulation.platform import PlatformMechanism
 
 RATE = 100.0  # [Hz]
 CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders
@@ -470,37 +468,35 @@ def _payload_mass(run: Injecting) -> Injected:
     engine, robot = run.engine, run.engine.robot
     share = run.sizes(lambda: {'share': run.size(0.05, 0.12)})['share']
     mass, tool = share * float(robot.masses.sum()), engine.structure.tool
-    centre = np.array([0.0, 0.0, 0.05])
-    if isinstance(run.model, PlatformMechanism):
-        centre = robot.centre_of(tool)
+    centre = robot.centre_of(tool) if robot.tool_place.is_spread else (0.0, 0.0, 0.05)
     engine.carry(tool, body_at(mass, tuple(centre), np.zeros((3, 3))))
     return None, {'mass': mass}
 
 
 def _link_mass(run: Injecting) -> Injected:
-    """Add a share of its mass to a link at its centre, or to all rods of a 3-PPRS."""
+    """Add a share of its mass to a link at its centre, or to all links that are alike."""
     engine, robot = run.engine, run.engine.robot
-    rods = isinstance(run.model, PlatformMechanism)
+    places = links_that_weigh(run.model)
 
     def draw() -> dict[str, Any]:
-        name = 'rods' if rods else robot.body_names[
-            int(run.random.choice(links_that_weigh(run.model)))]
+        name = str(run.random.choice([*places]))
         return {'name': name, 'share': run.scale * float(run.random.uniform(0.1, 0.3))}
 
     name, share = run.sizes(draw).values()
-    for link in RODS if rods else (name,):
+    for link in places[name]:
         mass = share * float(robot.masses[robot.body_names.index(link)])
         engine.carry(link, body_at(mass, tuple(robot.centre_of(link)), np.zeros((3, 3))))
     return None, {f'{name}.mass': mass}
 
 
-def links_that_weigh(model: DriveModel) -> list[int]:
-    """Return the links whose mass can be hidden, or raise InjectedEffectError.
+def links_that_weigh(model: DriveModel) -> dict[str, tuple[str, ...]]:
+    """Return the links whose mass can be hidden, by name, or raise InjectedEffectError.
 
     What turns about an upright axis shows in no weight, and the last link is the payload's.
     """
-    able = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
-            and (j or model.robot.structure.loops)]
+    robot = model.robot
+    able = {place.link: place.links for place in robot.link_places
+            if robot.structure.loops or place.link != robot.body_names[0]}
     if not able:
         raise InjectedEffectError('link_mass needs a link between the first and the tool')
     return able
@@ -539,22 +535,21 @@ def _payload_pick_up(run: Injection) -> Injected:
     return None, sizes
 
 
-def _passive_joints(run: Injection, effect: str, others: Mapping[str, tuple[str, ...]],
-                    ) -> Mapping[str, tuple[str, ...]]:
-    """Return passive joints by name; of a 3-PPRS all hinges under one, and others in addition."""
-    structure = run.model.robot.structure
-    if isinstance(run.model, PlatformMechanism):
-        return {'revolute': HINGES, **others}
-    found = {name: (name,) for name, (row, _) in structure.friction_rows.items()
-             if row >= 0 and name not in structure.drives}
+def _passive_joints(run: Injection, effect: str, balls: bool) -> Mapping[str, tuple[str, ...]]:
+    """Return passive joints with a position by name, and balls where several share their friction.
+
+    Friction of a single ball is hard to distinguish from that of its neighbours.
+    """
+    found = {joint.name: joint.joints for joint in run.model.robot.passive_joints
+             if joint.has_position or (balls and len(joint.joints) > 1)}
     if not found:
         raise InjectedEffectError(f'{effect} needs a passive joint')
     return found
 
 
 def _joint_friction(run: Injection) -> Injected:
-    """Inject T w / sqrt(w^2 + w_0^2) in a passive joint, in all of a kind in a 3-PPRS."""
-    groups = _passive_joints(run, 'joint_friction', {'spherical': BALLS})
+    """Inject T w / sqrt(w^2 + w_0^2) in a passive joint, or in all that are alike."""
+    groups = _passive_joints(run, 'joint_friction', balls=True)
     closed = run.engine.closed(run.motion)
 
     def rows_of(name: str) -> Array:
@@ -580,8 +575,8 @@ def _joint_friction(run: Injection) -> Injected:
 
 
 def _joint_spring(run: Injection) -> Injected:
-    """Inject k x (1 + (x / x_h)^2), x = u - u_0, in a passive joint, in all hinges of a 3-PPRS."""
-    groups = _passive_joints(run, 'joint_spring', {})
+    """Inject k x (1 + (x / x_h)^2), x = u - u_0, in a passive joint, or in all that are alike."""
+    groups = _passive_joints(run, 'joint_spring', balls=False)
     closed = run.engine.closed(run.motion)
 
     def draw() -> dict[str, Any]:
@@ -633,7 +628,7 @@ def _tool_drag(run: Injection) -> Injected:
 
 def _require_platform(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for a robot whose payload_mass has a centre and an inertia."""
-    if not isinstance(model, PlatformMechanism):
+    if not model.robot.tool_place.is_spread:
         raise InjectedEffectError(f'{name} acts on the platform of a 3-PPRS: choose payload_mass')
 
 

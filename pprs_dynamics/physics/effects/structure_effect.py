@@ -184,7 +184,7 @@ class AddedBody(BodyEffect):
         Of links that are alike the first represents all, with a body anywhere. With a mass more
         at its own centre each of them is a hypothesis of its own.
         """
-        link, centre, weight, is_spread = place
+        link, centre, weight, is_spread, _ = place
         prefix, count = cls.prefix_of(place), 1 if is_spread else None
         mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
         variants: list[tuple[str, ...]] = [(mass,)]

@@ -113,7 +113,8 @@ class Mechanism:
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """Joints and rotating loops without a drive."""
         return tuple(PassiveJoint(name, self.radii.get(name, 0.0),
-                                  row < 0 or bool(self.structure.tables.turns[row]), row >= 0)
+                                  row < 0 or bool(self.structure.tables.turns[row]), row >= 0,
+                                  (name,))
                      for name, (row, _) in self.structure.friction_rows.items()
                      if name not in self.drives)
 
@@ -130,7 +131,7 @@ class Mechanism:
         for k, name in enumerate(self.body_names):
             if k != self.carrier and self.masses[k] > 0:
                 x, y, z = (round(each, 6) for each in self.centre_of(name).tolist())
-                found.append(BodyPlace(name, (x, y, z), float(self.masses[k])))
+                found.append(BodyPlace(name, (x, y, z), float(self.masses[k]), links=(name,)))
         return tuple(found)
 
     def centre_of(self, link: str) -> Array:

@@ -67,12 +67,15 @@ class PassiveJoint(NamedTuple):
         False for a slide.
     has_position : bool
         Whether one number says where it is, as of a hinge and not of a ball.
+    joints : tuple of str
+        Of the tree, closures included.
     """
 
     name: str
     radius: float
     turns: bool = True
     has_position: bool = True
+    joints: tuple[str, ...] = ()
 
 
 class BodyPlace(NamedTuple):
@@ -87,12 +90,15 @@ class BodyPlace(NamedTuple):
         What the link weighs, which nothing can take off it [kg]; inf where that is left open.
     is_spread : bool
         Whether what is added is spread as the link's own mass is, so that its mass alone counts.
+    links : tuple of str
+        Of the tree.
     """
 
     link: str
     centre: tuple[float, float, float]
     mass: float
     is_spread: bool = False
+    links: tuple[str, ...] = ()
 
 
 class StructureLoad(NamedTuple):

@@ -50,7 +50,9 @@ from pprs_dynamics.physics.three_pprs import closed_form
 from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Joints
 
 HOME_HEIGHT = 0.5  # [m], of the platform at home
-SPHERICAL, RODS = 'spherical', 'rods'  # the joints A_i, and the rods; C_i are REVOLUTE
+SPHERICAL = 'spherical'  # the joints A_i; C_i are REVOLUTE
+HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
+ALIKE = {REVOLUTE: HINGES, SPHERICAL: BALLS}  # of the tree
 POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.
@@ -402,8 +404,8 @@ class ThreePprs:
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """The joints C_i, and the joints A_i."""
-        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE)
-                     for name in (REVOLUTE, SPHERICAL))
+        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE,
+                                  joints=joints) for name, joints in ALIKE.items())
 
     @property
     def tool_place(self) -> BodyPlace:
@@ -413,7 +415,7 @@ class ThreePprs:
     @property
     def link_places(self) -> tuple[BodyPlace, ...]:
         """The rods, all three alike."""
-        return (BodyPlace(RODS, (0.0, 0.0, 0.0), inf, is_spread=True),)
+        return (BodyPlace('rods', (0.0, 0.0, 0.0), inf, is_spread=True, links=RODS),)
 
     @property
     def moved_mass(self) -> float:
@@ -440,7 +442,7 @@ class ThreePprs:
 
         The masses are not checked, see `with_masses`.
         """
-        if link == RODS:
+        if link == 'rods':
             return self.with_masses(rods=tuple(m_b + mass for m_b in self.masses.rods))
         return self.with_masses(payload=self.masses.payload + mass)
 
@@ -503,8 +505,8 @@ class ThreePprs:
         """Return the robot as a mechanism; see `tree_structure`."""
         structure = tree_structure(self.geometry, self.masses, (*strokes, efforts))
         bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
-        return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(COUNT),
-                         self.gravity)
+        return Tree(structure, bodies, structure.inertial[bodies], np.zeros(COUNT), self.gravity,
+                    places=self)
 
     # --- motion --------------------------------------------------------------------------------
 
@@ -648,6 +650,33 @@ class ThreePprs:
         """Raise ModelError, of a key and its value, for bodies that cannot be."""
         if not self.masses.total > 0 or min(self.masses.rods) < 0:
             raise ModelError(key, value, 'leave masses greater than 0')
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tree(Mechanism):
+    """A 3-PPRS as a mechanism, with joints and links that are alike.
+
+    Parameters
+    ----------
+    places : ThreePprs
+    """
+
+    places: ThreePprs
+
+    @property
+    def passive_joints(self) -> tuple[PassiveJoint, ...]:
+        """As of the closed form."""
+        return self.places.passive_joints
+
+    @property
+    def tool_place(self) -> BodyPlace:
+        """As of the closed form."""
+        return self.places.tool_place
+
+    @property
+    def link_places(self) -> tuple[BodyPlace, ...]:
+        """As of the closed form."""
+        return self.places.link_places
 
 
 def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:

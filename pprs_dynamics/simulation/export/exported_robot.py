@@ -31,6 +31,7 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, ROBOT
+from pprs_dynamics.physics.three_pprs.robot import BALLS, HINGES
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -39,7 +40,6 @@ SPRINGREF = 'springref'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
-HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
 # Of effects on drives: their parameters as a joint's.
 OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
     ViscousFriction: {'coefficient': DAMPING},
@@ -70,8 +70,8 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
     left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
             if not _take(joints, numbers, HELD[kind])]
     # Joints of a format that passive joints of the model are; those without do not turn alone.
-    passive = {joint.name: (joint.name,) if model.moves_joints else HINGES
-               for joint in model.robot.passive_joints if joint.has_position}
+    passive = {joint.name: joint.joints for joint in model.robot.passive_joints
+               if joint.has_position}
     robot = model.robot
     for effect in model.effects:
         if effect.name not in model.values.get('effects.active', ()):
