@@ -341,7 +341,8 @@ class Mechanism:
     def load_of_friction(self, state: MechanismState, joints: JointFriction) -> None:
         """Return None: what friction of passive joints adds to the loads is neglected."""
 
-    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
+    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
+                  ) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
         return replace(state, position=position, acceleration=acceleration, known=None,
                        motion=None)

@@ -150,8 +150,8 @@ class Robot(Protocol):
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        is_own: bool = False) -> Any: ...
 
-    def moved(self, state: MechanismState, position: Array, acceleration: Array,
-              ) -> MechanismState: ...
+    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
+                  ) -> MechanismState: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,13 +260,13 @@ class MechanismState(JointMotion):
         """Return the state with a drive at other positions; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
-        return self.robot.moved(self, position, self.acceleration)
+        return self.robot.perturbed(self, position, self.acceleration)
 
     def accelerated(self, drive: int, change: float) -> MechanismState:
         """Return the state with another acceleration of a drive."""
         acceleration = self.acceleration.copy()
         acceleration[:, drive] += change
-        return self.robot.moved(self, self.position, acceleration)
+        return self.robot.perturbed(self, self.position, acceleration)
 
     def against_friction(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

@@ -141,7 +141,7 @@ class Parameters(NamedTuple):
     drives: tuple[DriveParameters, ...]
 
 
-class Tables(NamedTuple):
+class Data(NamedTuple):
     """Motions, loads and results of samples; see `forces`."""
 
     motion: Any
@@ -223,7 +223,7 @@ def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
     int
         The first sample out of reach or too near a singularity, or -1.
     """
-    p, t = read_parameters(parameters), elements(Tables(motion, load, parts))
+    p, t = read_parameters(parameters), elements(Data(motion, load, parts))
     first = -1
     for s in range(len(motion)):
         if not _is_regular(p, s, t.motion, t.load, t.parts) and first < 0:

@@ -611,7 +611,8 @@ class ThreePprs:
         return StructureLoad(np.hstack((np.zeros_like(moment), moment)), {
             REVOLUTE: k_r * u_dot + k_s * (u_dot - omega @ axes.T)})
 
-    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
+    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
+                  ) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
         if position is state.position:
             motion = state.motion.accelerated(np.einsum(

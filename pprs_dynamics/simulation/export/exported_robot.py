@@ -67,7 +67,7 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
         For bodies that no real ones are, and closures that no format has.
     """
     joints: Joints = {}
-    left = [key for key, numbers in (_of_arm if model.moves_joints else _of_platform)(model)
+    left = [key for key, numbers in (_of_mechanism if model.moves_joints else _of_platform)(model)
             if not _take(joints, numbers, HELD[kind])]
     # Joints of a format that passive joints of the model are; those without do not turn alone.
     passive = {joint.name: joint.joints for joint in model.robot.passive_joints
@@ -126,7 +126,7 @@ def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
         yield 'equations', None
 
 
-def _of_arm(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+def _of_mechanism(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
     """Yield keys of rotors and friction, also of passive joints; None for those of no format."""
     yield 'friction.viscous', _spread(model, 'friction.viscous', DAMPING)
     yield 'friction.coulomb', _spread(model, 'friction.coulomb', FRICTION)
