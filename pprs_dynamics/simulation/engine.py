@@ -250,8 +250,7 @@ class MechanismEngine:
             needed += passive
         reactions = np.einsum('nlij,nj->nli', closed.reactions, needed)
         forces -= np.einsum('bl,nli->nbi', self._behind, reactions)
-        return Carried(needed, np.einsum('nvd,nv->nd', closed.rates, needed), forces, axes,
-                       reactions)
+        return Carried(np.einsum('nvd,nv->nd', closed.rates, needed), forces, axes, reactions)
 
     def torques(self, motion: JointMotion, passive: Array | None = None) -> Array:
         """Return inverse dynamics along a motion, (N, D); see `carried`."""
@@ -321,8 +320,6 @@ class Carried(NamedTuple):
 
     Parameters
     ----------
-    needed : (N, nv) array
-        Efforts of all joints of the tree, loops cut open.
     efforts : (N, D) array
         Of the drives.
     forces : (N, bodies, 3) array
@@ -333,7 +330,6 @@ class Carried(NamedTuple):
         Force of each closure on its second link [N].
     """
 
-    needed: Array
     efforts: Array
     forces: Array
     axes: Array

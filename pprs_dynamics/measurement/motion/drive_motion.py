@@ -163,7 +163,7 @@ def _held_poses(recording: Recording) -> DriveMotion:
         position, still, still, index, (slice(0, len(index)),),
         firsts, int(lengths.max()),
         Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
-        (SamplingGrid(step, np.arange(len(index), dtype=float), 0.0, 0),),
+        (SamplingGrid(step, np.arange(len(index), dtype=float)),),
         np.zeros((2, position.shape[1]), dtype=bool),
         (f'{len(parts)} poses are held: each counts by the mean of its effort',))
 

@@ -43,16 +43,10 @@ class SamplingGrid:
         [s].
     places : (n,) array
         Where the samples lie, in steps from the first one.
-    jitter : float
-        Of the stamps about equal steps [s rms].
-    lost : int
-        Steps without a sample.
     """
 
     step: float
     places: Array
-    jitter: float
-    lost: int
 
     @property
     def is_regular(self) -> bool:
@@ -114,7 +108,7 @@ def find_grid(time: Array, position: Array) -> tuple[SamplingGrid, str]:
     step = float((time[-1] - time[0]) / places[-1])
     jitter = float(np.sqrt(np.mean((steps - counts * step) ** 2) / 2))
     missing = int(places[-1]) - len(steps)
-    equal = SamplingGrid(step, places, jitter, missing)
+    equal = SamplingGrid(step, places)
     told = (f'{missing} lost samples are bridged by a cubic spline through the positions; their '
             'efforts stay unknown' if missing else '')
 
@@ -122,7 +116,7 @@ def find_grid(time: Array, position: Array) -> tuple[SamplingGrid, str]:
     speed = np.sqrt(np.mean((np.diff(position, axis=0) / steps[:, None]) ** 2, axis=0))
     if not np.any(jitter * speed > HARMLESS_JITTER * noise):
         return equal, told
-    stamped = SamplingGrid(step, (time - time[0]) / step, jitter, missing)
+    stamped = SamplingGrid(step, (time - time[0]) / step)
     as_stamped = _noise(stamped, position)
     grid, what = (stamped, 'positions are smoother when the stamps are taken as true, and are '
                   'interpolated to equal steps by a cubic spline') if (
