@@ -28,6 +28,7 @@ from pprs_dynamics.physics.mechanism.state import (
     SLIDE,
     BodyPlace,
     MechanismState,
+    Motion,
     PassiveJoint,
     Reversal,
     StructureLoad,
@@ -262,7 +263,7 @@ class Mechanism:
         still = np.zeros_like(position)
         return JointMotion(position, still, still, np.arange(samples, dtype=float))
 
-    def state(self, motion: JointMotion | PlatformMotion, reversal: Reversal,
+    def state(self, motion: Motion, reversal: Reversal,
               friction: JointFriction = NO_FRICTION, closed: dict[Any, Array] | None = None,
               found: InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
@@ -306,7 +307,7 @@ class Mechanism:
         """Return friction of joints and numbers of drives, (OF_DRIVE, D), for `one_pass`."""
         return joints, drives
 
-    def one_pass(self, motion: JointMotion | PlatformMotion,
+    def one_pass(self, motion: Motion,
                  parameters: tuple[JointFriction, Array], closed: dict[Any, Array] | None,
                  has_state: bool = False) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.

@@ -36,7 +36,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, Reversal
+from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, Motion, Reversal
 from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
@@ -292,7 +292,7 @@ class DriveModel:
         # Of one with the parameters that it has elsewhere, its own again.
         return (find_effect(effect.name) or effect).bound(self.robot)
 
-    def mechanism(self, motion: Any, closed: dict[Any, Array] | None = None) -> MechanismState:
+    def mechanism(self, motion: Motion, closed: dict[Any, Array] | None = None) -> MechanismState:
         """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
         state: MechanismState = self.robot.state(motion, self.reversal, self._joint_friction,
                                                  closed)
@@ -311,7 +311,7 @@ class DriveModel:
             state.position, state.velocity, state.acceleration).with_channels(state.channels)
         return self.mechanism(motion if state.time is None else motion.with_time(state.time))
 
-    def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
+    def drive_forces(self, motion: Motion, state: ModelState | None = None) -> Forces:
         """Return the forces that the drives must apply for a motion.
 
         Parameters
@@ -390,7 +390,7 @@ class DriveModel:
         """Effects that are not part of the one pass."""
         return tuple(effect for effect in self.effects if not isinstance(effect, OWN))
 
-    def _require_motion(self, motion: Any) -> None:
+    def _require_motion(self, motion: Motion) -> None:
         """Raise MotionError for a motion that this model has no forces for."""
         if not isinstance(motion, self.robot.motions):
             kinds = ' or a '.join(kind.__name__ for kind in self.robot.motions)
@@ -402,13 +402,13 @@ class DriveModel:
                               f'be (N, {len(self.drives)}), a column for each of '
                               f'{", ".join(self.drives)}', 'shape')
 
-    def forces_at(self, mechanism: Any, state: ModelState | None = None) -> Forces:
+    def forces_at(self, mechanism: MechanismState, state: ModelState | None = None) -> Forces:
         """Return the forces at a state of the mechanism; see `drive_forces`."""
         return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
                                   state)
 
-    def _with_effects(self, effects: Sequence[Effect], parts: dict[str, Array], mechanism: Any,
-                      state: ModelState | None) -> Forces:
+    def _with_effects(self, effects: Sequence[Effect], parts: dict[str, Array],
+                      mechanism: MechanismState, state: ModelState | None) -> Forces:
         """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
         state.advance(mechanism.time, self.initial_state)
@@ -460,7 +460,7 @@ class DriveModel:
         return {effect.name: effect.assumed_at_start for effect in self.effects
                 if effect.assumed_at_start}
 
-    def sound_at(self, motion: Any) -> Self:
+    def sound_at(self, motion: Motion) -> Self:
         """Return the model without those effects of other packages that fail for a motion.
 
         Raises
@@ -496,9 +496,7 @@ class DriveModel:
         sensors = [effect for effect in self.effects if effect.is_measurement]
         if not sensors:
             return forces
-        # Each effect gets the states that its kind of model makes.
-        mechanism: Any = forces.mechanism
-        parts, total = dict(forces.parts), forces.total
+        mechanism, parts, total = forces.mechanism, dict(forces.parts), forces.total
         state = self.initial_state() if state is None else state
         for effect in sensors:
             after = effect.measured(total, mechanism, state.memories[effect.name])
@@ -554,7 +552,7 @@ class Margins:
     drive: str
 
 
-def margins(model: DriveModel, mechanism: Any) -> Margins:
+def margins(model: DriveModel, mechanism: MechanismState) -> Margins:
     """Return the margins of a motion that the model has accepted.
 
     Parameters

@@ -17,6 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import EffectError, LimitError, WorkspaceError
 from pprs_dynamics.physics.mechanism.evaluation import run
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 RIGID_BODY = 'rigid_body'
 # The model's own friction, in its drives and in its passive joints.
@@ -44,8 +45,8 @@ class Forces:
     # Functions, because of most samples only the total is read: building the rest takes longer
     # than the equations.
     def __init__(self, total: Array, parts: dict[str, Array] | Callable[[], dict[str, Array]],
-                 mechanism: Any,
-                 drive_motion: Any = None) -> None:
+                 mechanism: MechanismState | Callable[[], MechanismState],
+                 drive_motion: Sequence[Array] | None = None) -> None:
         self.total, self._parts, self._mechanism = total, parts, mechanism
         self._drive_motion = drive_motion
 
@@ -60,7 +61,7 @@ class Forces:
         return self._parts
 
     @property
-    def mechanism(self) -> Any:
+    def mechanism(self) -> MechanismState:
         """The state of the mechanism."""
         if callable(self._mechanism):
             self._mechanism = self._mechanism()
