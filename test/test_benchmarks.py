@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -45,13 +43,6 @@ def test_mutants_have_tests_that_there_are() -> None:
 @pytest.mark.slow
 def test_mutants_are_mistakes_in_code_that_there_is() -> None:
     assert mutants.stale() == []
-
-
-def test_a_score_tells_its_options_and_where_its_outcomes_go() -> None:
-    shown = subprocess.run([sys.executable, '-m', 'benchmarks.scores.diagnosis', '--help'],
-                           cwd=PROJECT, capture_output=True, text=True, timeout=60, check=True)
-    assert '--scheduler' in shown.stdout
-    assert 'output/score.jsonl' in shown.stdout
 
 
 # The naming benchmark scores as its protocol says: entrants whose score is known get it.

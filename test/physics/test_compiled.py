@@ -13,18 +13,16 @@ import copy
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from random_states import model_of, paper_model, random_motion, random_robot
+from random_states import model_of, paper_model, random_motion, random_robot, without_compiler
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.physics.mechanism import evaluation
 
 # Compiled, sums may be associated otherwise; forces of up to 40 N then differ by some 1e-14.
 AGREEMENT = 1e-12
@@ -33,19 +31,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
     'corrected': {}, 'printed': {'equations': 'printed'},
     'widths': {'friction.reversal_rate': 0.3},
     'chains': {'friction.approach': 'independent_chains', 'limits.rod_cosine': 1e-6}}
-
-
-@pytest.fixture
-def plainly(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Any]], Any]:
-    """Return what evaluates a function without compiled code."""
-    def run(function: Callable[[], Any]) -> Any:
-        with monkeypatch.context() as patch:
-            patch.setattr(evaluation, '_compiled', {})
-            with evaluation.not_compiling_yet():
-                found = function()
-            assert not evaluation._compiled
-            return found
-    return run
 
 
 def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarray]:
@@ -62,11 +47,12 @@ def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarra
 
 @pytest.mark.parametrize('variant', VARIANTS)
 @pytest.mark.parametrize('elbow', ['up', 'down'])
-def test_compiled_equals_plain(plainly, variant, elbow):
+def test_compiled_equals_plain(variant, elbow):
     rng = np.random.default_rng(5)
     model = model_of(random_robot(rng, elbow), VARIANTS[variant])
     motion = random_motion(rng, SAMPLES, elbow)
-    compiled, plain = everything(model, motion), plainly(lambda: everything(model, motion))
+    compiled, plain = everything(model, motion), without_compiler(
+        lambda: everything(model, motion))
     for name, values in compiled.items():
         assert_allclose(values, plain[name], rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
     # One pass gives what the steps give that are kept.

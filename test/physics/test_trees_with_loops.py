@@ -16,13 +16,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from model_recordings import with_effects
 from oracles.mujoco_loops import MujocoLoops
-from random_states import random_motion
+from random_states import random_motion, without_compiler
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.mechanism import evaluation
 from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.mechanism.tree_equations import solve
@@ -56,18 +55,14 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize('name', ['hexapod', 'five_bar'])
-def test_python_without_a_compiler_is_the_same(tmp_path: Path, name: str,
-                                               monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_without_a_compiler_is_the_same(tmp_path: Path, name: str) -> None:
     structure = DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure
     joints = {hinge: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01}
               for hinge in structure.friction_rows}
     model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])[:8]
     compiled = model.drive_forces(motion).parts
-    monkeypatch.setattr(evaluation, '_compiled', {})
-    with evaluation.not_compiling_yet():
-        plain = model.drive_forces(motion).parts
-    assert not evaluation._compiled
+    plain = without_compiler(lambda: model.drive_forces(motion).parts)
     assert set(plain) == set(compiled)
     for part, values in compiled.items():
         assert plain[part] == pytest.approx(values, abs=1e-9), part

@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.physics.mechanism import evaluation
 from pprs_dynamics.physics.three_pprs.robot import ClosedForm, Geometry, Masses, ThreePprs
 
 ELBOWS = ('up', 'down')
@@ -126,3 +128,13 @@ OPEN_LIMITS = {'limits.condition_number': 1e9, 'limits.rod_sine': 1e-6}
 def model_of(robot: ThreePprs, changes: Mapping[str, Any] | None = None) -> DriveModel:
     """Return the paper's friction on another robot, without limits on conditioning."""
     return paper_model({**robot_keys(robot), **OPEN_LIMITS, **(changes or {})})
+
+
+def without_compiler(function: Callable[[], Any]) -> Any:
+    """Return what a function gives where no equations are compiled yet."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evaluation, '_compiled', {})
+        with evaluation.not_compiling_yet():
+            found = function()
+        assert not evaluation._compiled
+    return found
