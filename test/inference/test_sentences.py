@@ -87,6 +87,7 @@ def in_one_line(text: str) -> str:
 def test_with_details_the_terminal_shows_everything_within_its_width(make: Any) -> None:
     diagnosis = make()
     words = word_diagnosis(diagnosis)
+    assert len(re.findall(r'[.;](?: |$)', words.headline)) <= 2
     text = printed(diagnosis, 80, details=True)
     assert max(map(len, text.splitlines())) <= 80
     assert '…' not in text, 'nothing is cut off'

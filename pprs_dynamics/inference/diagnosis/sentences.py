@@ -325,9 +325,6 @@ def _headline(diagnosis: Diagnosis) -> str:
     residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
     is_noise = residual <= AT_NOISE * diagnosis.noise_floor
     lacking = _lacking(diagnosis)
-    refitted = ' and refitted numbers of the model' * is_refit(diagnosis)
-    fall = f'ith {"it" if len(effects) == 1 else "them"}{refitted} the error ' + change(
-        root_mean_square(diagnosis.residuals.error), residual, unit)
     if diagnosis.unconfirmed and not effects and not diagnosis.depends_on:
         return 'No effect is supported by held-out data.' + ('' if is_noise else (
             f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
@@ -338,7 +335,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         if more := len(where[MOST_PLACES:]):
             places.append(f'in {more} more place{"s" * (more > 1)}')
         return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
-                + (f' In addition, {lacking}; w{fall}.' if effects else ''))
+                + (f' In addition, {lacking}.' if effects else ''))
     unseen = (f'the recording does not show how much of the error of '
               f'{listed(diagnosis.unseen_noise)} is noise') if diagnosis.unseen_noise else ''
     if not effects:
@@ -350,8 +347,11 @@ def _headline(diagnosis: Diagnosis) -> str:
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
     refuted = listed([f'{_title(diagnosis, effect)} ({effect.objection})'
                       for effect in diagnosis.unconfirmed])
+    refitted = ' and refitted numbers of the model' * is_refit(diagnosis)
+    fall = f'With {"it" if len(effects) == 1 else "them"}{refitted} the error ' + change(
+        root_mean_square(diagnosis.residuals.error), residual, unit)
     return f'{begin}{lacking[1:]}. ' + (f'Not confirmed: {refuted}.' if refuted
-                                        else f'W{fall}{level}')
+                                        else f'{fall}{level}')
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
