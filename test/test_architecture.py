@@ -112,15 +112,6 @@ def test_every_file_begins_with_the_licence(folder: str) -> None:
             if not file.read_text(encoding='utf-8').startswith(LICENCE)] == []
 
 
-def test_no_page_is_left_with_a_gap_where_a_figure_belongs() -> None:
-    """Scripts fill in @NAME@; the texts that they fill are called ..._text.md."""
-    pages = [PACKAGE.parent / 'README.md', *(PACKAGE.parent / 'docs').glob('*.md')]
-    assert len(pages) > 8
-    gaps = {page.name: re.findall(r'@[A-Z]+@', page.read_text(encoding='utf-8'))
-            for page in pages if not page.stem.endswith('_text')}
-    assert not {name: found for name, found in gaps.items() if found}
-
-
 DESCRIPTION = ElementTree.parse(PACKAGE.parent / 'package.xml').getroot()
 
 
