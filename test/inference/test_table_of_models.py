@@ -25,6 +25,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import estimate
+from pprs_dynamics.inference.search.form_error import SHAPES
 from pprs_dynamics.inference.search.held_out import BLOCKS, HeldOut, PredictiveGain
 from pprs_dynamics.inference.search.table import ModelTable, Row, with_exact_best
 from pprs_dynamics.inference.search.unknown import best_patterns
@@ -132,6 +133,12 @@ def test_what_no_form_explains_is_above_the_noise(
     assert {e.name for e in found.effects} == set(present)
     assert low < found.above_noise[AXIS] < high
     assert found.verdict == 'unknown'
+
+
+def test_one_form_error_of_a_hundred_is_too_large() -> None:
+    errors = DECISIONS.form_share * np.random.default_rng(4).normal(size=(200_000, SHAPES))
+    share = np.mean(np.sqrt(np.mean(errors ** 2, axis=1)) > DECISIONS.most_form_share)
+    assert share == pytest.approx(0.01, abs=0.001)
 
 
 def test_an_effect_within_the_form_error_of_the_models_friction_is_not_reported() -> None:

@@ -228,13 +228,14 @@ class Answer:
 
         Every fit takes forms of friction as unknown, so that they are part of the explanation.
         The form error is a share of the sum of forces: two that cancel are no force of a machine.
+        Its size is that which 99 of 100 form errors do not exceed: half of them exceed a mean.
         """
         found, residual = {}, self.remaining - friction_forms(self.fits, self.fitted)
         forms = sum((self.force(candidate) for candidate in self.fitted.effects
                      if candidate.effect.idealised), np.zeros_like(residual))
         for d in self.fits.regression.drives:
             floor = max(self.noise_levels[self.drives[d]], 1e-300)
-            form = self.decisions.form_share * root_mean_square(forms[:, d]) / floor
+            form = self.decisions.most_form_share * root_mean_square(forms[:, d]) / floor
             allowed = min(float(np.hypot(self.decisions.left_ratio, form)),
                           self.decisions.most_left)
             # A constant may be slow noise.
