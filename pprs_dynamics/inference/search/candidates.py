@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb, inf, log, log1p
 from operator import add, sub
@@ -137,6 +137,8 @@ class Component:
         change; none where it does not have it.
     course : Course or None
         None: all the time.
+    is_shared : bool
+        Its shape is that of the effect on all drives whose components are shared.
     """
 
     effect: type[CatalogueEffect]
@@ -146,6 +148,7 @@ class Component:
     centre: tuple[float, ...] = ()
     given: tuple[float, ...] = ()
     course: Course | None = None
+    is_shared: bool = False
 
     @classmethod
     def of(cls, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
@@ -474,14 +477,21 @@ class PriorCosts:
 
     def of_candidate(self, candidate: Candidate,
                      of_component: Callable[[Component], CostTerms]) -> CostTerms:
-        """Return the prior cost of what was chosen: hypotheses, drives, and each component."""
+        """Return the prior cost of what was chosen: hypotheses, drives, and each component.
+
+        A shape that components share was chosen once.
+        """
         if isinstance(candidate, UnknownCandidate):
             return candidate.terms
         terms = CostTerms(
             names=len(candidate.hypotheses) * self.of_name(),
             drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)),
             shapes=0.0 if candidate.course is None else self.of_course(candidate.course))
-        return sum((of_component(component) for component in candidate.components), terms)
+        costs = [of_component(component) for component in candidate.components]
+        shared = [k for k, component in enumerate(candidate.components) if component.is_shared]
+        for k in shared[1:]:
+            costs[k] = replace(costs[k], shapes=0.0)
+        return sum(costs, terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the prior cost of a variant and of a shape among those tried.

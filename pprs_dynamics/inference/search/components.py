@@ -154,7 +154,8 @@ class DriveComponents:
                  for component, gain in zip(components, gains, strict=True)
                  if component.effect is like.effect and component.names == like.names]
         found.sort(key=lambda pair: -pair[0])
-        return [replace(like, shape=component.shape) for _, component in found[:count]]
+        return [replace(like, shape=component.shape, is_shared=False)
+                for _, component in found[:count]]
 
     def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:
         """Return the best shape and variant of every effect, by name, with its gain at a noise."""
@@ -271,6 +272,7 @@ class Components:
 
     def block(self, component: Component) -> Block:
         """Return the columns of a component, transformed, with their prior."""
+        component = replace(component, is_shared=False)
         if component not in self._blocks:
             term = self.term(component)
             block = self.regression.term_block(term, component.names)

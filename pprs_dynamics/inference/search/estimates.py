@@ -103,13 +103,13 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
     are_drives_known : bool
         It is on these drives for certain: somebody chose them.
     """
-    slopes = dict(fits.slopes(fitted))
+    slopes = fits.slopes(fitted)
     elsewhere = [] if are_drives_known else _determined_on_other_drives(fits, fitted, candidate)
     centres = {component: _free_centre(fits, component, names)
                for component in candidate.components
                if (names := moments_left_out(component.effect, component.names))}
     elsewhere += centres.values()
-    fit = fits.regression.stated(fitted.fit, [*slopes.values(), *elsewhere])
+    fit = fits.regression.stated(fitted.fit, [*dict.fromkeys(slopes.values()), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     moments: dict[str, Estimate] = {}

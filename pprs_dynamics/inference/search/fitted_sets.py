@@ -296,16 +296,22 @@ class FittedSets:
                 moved[component] = replace(component, centre=centre)
         if not slopes and not moved:
             return None
-        fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)), fitted.fit)
-        if not moved and _gain(fit, [block for _, block in slopes]) < LEAST_IMPROVEMENT:
+        blocks = dict.fromkeys(slopes.values())
+        fit = self.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
+        if not moved and _gain(fit, list(blocks)) < LEAST_IMPROVEMENT:
             return None
-        for component, block in slopes:
+        shapes: dict[Block, dict[str, float]] = {}
+        for component, block in slopes.items():
+            if block in shapes:
+                moved[component] = replace(component, shape=tuple(sorted(shapes[block].items())))
+                continue
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 bounded = parameter.of(units_of(self.design.given, component.drive).turns)
                 shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
+            shapes[block] = shape
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
             EffectCandidate.of(moved.get(component, component) for component in c.components)
@@ -321,15 +327,41 @@ class FittedSets:
         return max((_distance(centre, component.centre)
                     for component, centre in self._centres(fitted)), default=0.0)
 
-    def slopes(self, fitted: CandidateSet) -> list[tuple[Component, Block]]:
-        """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
-        slopes = []
-        for component in (component for component in fitted.blocks if component.effect.shape):
-            rows = self.design.slope_rows(self.components.term(component),
-                                          component.total(fitted.coefficients(component)))
-            slopes.append((component,
-                           self.regression.block(rows, np.eye(len(component.effect.shape)))))
+    def slopes(self, fitted: CandidateSet) -> dict[Component, Block]:
+        """Return derivatives by the shapes of a set, of unit prior, for the components with any.
+
+        Components that share a shape share a block.
+        """
+        slopes: dict[Component, Block] = {}
+        for candidate in fitted.effects:
+            groups: dict[Component | None, list[Component]] = {}
+            for component in candidate.components if candidate.effect.shape else ():
+                groups.setdefault(None if component.is_shared else component, []).append(component)
+            for group in groups.values():
+                rows: dict[int, Array] = {}
+                for component in group:
+                    for d, row in self.design.slope_rows(
+                            self.components.term(component),
+                            component.total(fitted.coefficients(component))).items():
+                        rows[d] = rows.get(d, 0.0) + row
+                slopes |= dict.fromkeys(group, self.regression.block(
+                    rows, np.eye(len(candidate.effect.shape))))
         return slopes
+
+    def of_one_shape(self, fitted: CandidateSet, candidate: EffectCandidate) -> EffectCandidate:
+        """Return an effect of a set with the mean of its shapes, by precision, on all drives."""
+        slopes = self.slopes(fitted)
+        blocks = list(dict.fromkeys(slopes.values()))
+        fit = self.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
+        weights = 1 / np.array([np.diag(fit.covariance)[fit.index_of([slopes[component]])]
+                                for component in candidate.components])
+        shapes = np.array([[component.parameters[p.name] for p in candidate.effect.shape]
+                           for component in candidate.components])
+        mean = (weights * shapes).sum(axis=0) / weights.sum(axis=0)
+        shape = dict(zip((p.name for p in candidate.effect.shape), mean.tolist(), strict=True))
+        return EffectCandidate.of(
+            replace(component, shape=tuple(sorted(shape.items())), is_shared=True)
+            for component in candidate.components)
 
     def _reach(self, component: Component) -> dict[str, float]:
         """Return how far each shape parameter may move at once: half the way between trials."""

@@ -316,6 +316,14 @@ def _descended(fits: FittedSets, fitted: CandidateSet,
         fitted = fits.refined(best)
 
 
+def _may_share(fits: FittedSets, candidate: EffectCandidate) -> bool:
+    """Return whether shapes of an effect on several drives may be one: what they measure is."""
+    parts = candidate.components
+    return bool(candidate.effect.shape and len(parts) > 1
+                and not all(component.is_shared for component in parts)
+                and len({fits.design.given.units[d].turns for d in candidate.drives or ()}) == 1)
+
+
 def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidates]:
     """Yield a set with an effect on one drive more, in the shape of its strongest drive."""
     for candidate in fitted.effects:
@@ -326,8 +334,9 @@ def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidat
         for d in fits.regression.drives:
             if d not in candidate.drives and fits.design.acts_on(candidate.effect, d):
                 yield exchanged(fitted, candidate, EffectCandidate.of([
-                    *candidate.components, placed(fits.design, candidate.effect, d,
-                                                  strongest.parameters, strongest.names)]))
+                    *candidate.components, replace(placed(
+                        fits.design, candidate.effect, d, strongest.parameters, strongest.names),
+                        is_shared=strongest.is_shared)]))
 
 
 def _with_fewer(best: CandidateSet) -> Iterator[Candidates]:
@@ -344,6 +353,8 @@ def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
                     for component in candidate.components}
         ranked = sorted(candidate.components, key=lambda component: -strength[component])
         most = 3 * fits.decisions.rival_margin
+        if _may_share(fits, candidate):
+            yield exchanged(best, candidate, fits.of_one_shape(best, candidate))
         for count in range(1, len(ranked)):
             if sum(strength[component] for component in ranked[count:]) < most:
                 yield exchanged(best, candidate, EffectCandidate.of(ranked[:count]))
