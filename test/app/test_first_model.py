@@ -325,7 +325,8 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     efforts = DriveModel.load(described.path).drive_forces(JointMotion(Q, DQ, ddq)).total
     np.savetxt('run.csv', np.column_stack([TIME, Q, DQ, efforts + 2 * np.tanh(20 * DQ)]),
                delimiter=',', fmt='%.17g')
-    assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json']) == 0
+    assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json', '--picture', 'x.png']) == 0
+    assert (tmp_path / 'x.png').read_bytes().startswith(b'\x89PNG')
     said = ' '.join(capsys.readouterr().out.split())
     assert '800 of 800 samples' in said
     assert 'pprs fit run.csv --model robot.yaml --output base.yaml' in said

@@ -20,7 +20,6 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.report.charts import thinned
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-from pprs_dynamics.physics.model.model_writer import write_model
 
 
 @pytest.fixture(scope='module')
@@ -92,29 +91,28 @@ def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
     assert other.min() == -4.0
 
 
-# compare --mcap and --beside: files for PlotJuggler and Foxglove; two models on one recording.
+# compare --mcap: files for PlotJuggler and Foxglove.
 
 RATE, OFFSET = 100.0, 0.7  # [Hz, N]
 
 
 @pytest.fixture(scope='module')
-def two_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a two_models with a recording whose first slide needs more, and another model."""
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a recording whose first slide needs more."""
     where = tmp_path_factory.mktemp('bag')
     better = with_effects(DriveModel.load(), {'effort_offset': {'slide_1.force': OFFSET}})
     write_recording(where / 'run.csv', record(better, 0.05, 1, time=np.arange(0, 8.0, 1 / RATE)))
-    write_model(where / 'better.yaml', better.values)
     return where
 
 
 def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
-    two_models: Path, monkeypatch: pytest.MonkeyPatch,
+    bag: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.chdir(two_models)
+    monkeypatch.chdir(bag)
     assert main(['compare', 'run.csv', '--mcap', 'out.mcap', '--json', 'said.json']) == 0
     found: dict[str, list[tuple[int, np.ndarray]]] = {}
     said = []
-    with AnyReader([two_models / 'out.mcap']) as reader:
+    with AnyReader([bag / 'out.mcap']) as reader:
         for connection, _, data in reader.messages():
             message = reader.deserialize(data, connection.msgtype)
             if connection.topic == '/findings':
@@ -122,7 +120,7 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
                 continue
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             found.setdefault(connection.topic, []).append((stamp, message.effort))
-    content = json.loads((two_models / 'said.json').read_text())
+    content = json.loads((bag / 'said.json').read_text())
     assert said == [content['verdict'], *(each['text'] for each in content['where'])]
     assert len(said) > 1
     parts = {topic for topic in found if topic.startswith('/parts/')}
@@ -134,19 +132,3 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
     np.testing.assert_allclose(arrays['/residual'], arrays['/measured'] - arrays['/model'])
     np.testing.assert_allclose(arrays['/model'], sum(arrays[topic] for topic in parts), atol=1e-9)
     assert arrays['/residual'][:, 0].mean() == pytest.approx(OFFSET, abs=0.02)
-
-
-def test_errors_of_two_models_on_one_recording(
-    two_models: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(two_models)
-    beside = 'better.yaml'
-    assert main(['compare', 'run.csv', '--beside', beside, '--json', 'both.json',
-                 '--report', 'both.html']) == 0
-    content = json.loads((two_models / 'both.json').read_text())
-    assert content['beside']['name'] == beside
-    before, after = (side['drives']['slide_1']['rms'] for side in (content, content['beside']))
-    assert before == pytest.approx(OFFSET, rel=0.05)
-    assert after < 0.1
-    assert beside in capsys.readouterr().out
-    assert beside in (two_models / 'both.html').read_text()

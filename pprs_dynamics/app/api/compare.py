@@ -16,20 +16,16 @@ from pprs_dynamics.app.report import figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
-from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison, localise
+from pprs_dynamics.inference.diagnosis.comparison import Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
-from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
@@ -53,15 +49,12 @@ class ComparisonResult(Result):
         The numbers.
     notes : tuple of str
         How it was computed.
-    beside : Beside, optional
-        Errors of another model on the same recordings.
     """
 
     inputs: Inputs
     residuals: Residuals
     comparison: Comparison
     notes: tuple[str, ...]
-    beside: Beside | None = None
 
     @property
     def rms(self) -> float:
@@ -80,25 +73,22 @@ class ComparisonResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
-        content = {**self.comparison.to_dict(), 'verdict': self.verdict,
-                   'effort_looks_like': effort_looks_like(
-                       recording.findings for recording in self.inputs.fitted)}
-        return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
+        return {**self.comparison.to_dict(), 'verdict': self.verdict,
+                'effort_looks_like': effort_looks_like(
+                    recording.findings for recording in self.inputs.fitted)}
 
     def _drives(self) -> PlainTable:
         """Return the numbers of every drive; the grade comes last."""
-        comparison, beside = self.comparison, self.beside
+        comparison = self.comparison
         headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise')
         # One unit for all: names of joints need the room.
         marked = ('rms',) if len(comparison.unit) > 1 else ('rms', 'bias', 'peak', 'noise')
         return ('drive', *(f'{name} [{comparison.unit}]' if name in marked else name
-                           for name in headings),
-                *(['rms, other'] if beside else []), 'grade'), [
+                           for name in headings), 'grade'), [
             (name, plain(drive.rms), percent(drive.relative),
              rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
              percent(drive.explained_variance),
              '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
-             *([plain(beside.drives[name]) if name in beside.drives else 'none'] if beside else []),
              drive.grade)
             for name, drive in comparison.drives.items()]
 
@@ -113,9 +103,6 @@ class ComparisonResult(Result):
         parts = [table, escape(self.verdict), *(lines[:FIRST] or [NOWHERE])]
         if len(lines) > FIRST:
             parts.append(f'… and {len(lines) - FIRST} more, with --json or --report')
-        if self.beside is not None:
-            parts.append(f'Other: {escape(self.beside.name)}, rms {plain(self.beside.rms)} '
-                         f'instead of {plain(self.rms)} {self.comparison.unit}')
         if self.comparison.is_beyond_noise:
             words, command = self._next
             parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]
@@ -123,18 +110,16 @@ class ComparisonResult(Result):
 
     def page(self) -> Page:
         """Return the page of `pprs compare --report`: where it fails first, the rest folded."""
-        comparison, residuals, beside = self.comparison, self.residuals, self.beside
+        comparison, residuals = self.comparison, self.residuals
         recordings, statements = self.inputs.fitted, self.where
         page = Page('Model against measurement')
         page.text(self.verdict, 'lead')
         page.sources(self.inputs.model.source, *self.inputs.names)
         with page.columns():
             with page.block():
-                page.errors([ErrorRow(name, drive.rms, beside.drives.get(name) if beside else None,
-                                      drive.noise_floor)
+                page.errors([ErrorRow(name, drive.rms, noise=drive.noise_floor)
                              for name, drive in comparison.drives.items()],
-                            f'Error, rms [{comparison.unit}]; dotted: the noise.'
-                            + (f' Second bar: {beside.name}.' if beside else ''))
+                            f'Error, rms [{comparison.unit}]; dotted: the noise.')
                 if statements:
                     page.bullets([statement.text for statement in statements[:FIRST]],
                                  numbered=True)
@@ -230,8 +215,7 @@ class ComparisonResult(Result):
 
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
-            beside: str | PathLike[str] | None = None, progress: Progress | None = None,
-            as_it_is: bool = False) -> ComparisonResult:
+            progress: Progress | None = None, as_it_is: bool = False) -> ComparisonResult:
     """Hold a model against recordings: how wrong it is, on which drive, in which situations.
 
     Parameters
@@ -241,8 +225,6 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         A path is read, and its units and signs are checked; a Recording is not checked.
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
-    beside : path, optional
-        Another model file, compared with the same recordings.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     as_it_is : bool
@@ -273,16 +255,4 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         residuals, where,
         noise_floors(columns, residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
-    return ComparisonResult(
-        inputs, residuals, comparison, tuple(notes),
-        None if beside is None else _beside(inputs, Path(beside)))
-
-
-def _beside(inputs: Inputs, path: Path) -> Beside:
-    """Return the errors of another model on the same recordings."""
-    other = DriveModel.load(path)
-    if other.drives != inputs.model.drives:
-        raise ModelError('--beside', displayed(path), 'have the drives of the model: '
-                         f'{", ".join(inputs.model.drives)}')
-    residuals, _ = measure_residuals(other, inputs.fitted)
-    return Beside(displayed(path.name), rms_by_drive(residuals), rms(residuals))
+    return ComparisonResult(inputs, residuals, comparison, tuple(notes))

@@ -34,9 +34,9 @@ JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap')
-INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'file', 'manifest',
-          'store', 'path')
+OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'file', 'manifest', 'store',
+          'path')
 NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
          'store': 'the store'}
 

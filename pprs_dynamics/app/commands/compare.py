@@ -20,14 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--mcap', metavar='FILE.mcap', type=output_file('.mcap'),
                         help='bag to write: measured effort, effort of the model, its parts and '
                         'the residual, as sensor_msgs/JointState')
-    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file; its '
-                        'errors on the same recordings are printed too')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    screen, result = answer(compare, options, whole=True, topic=options.topic,
-                            beside=options.beside)
+    screen, result = answer(compare, options, whole=True, topic=options.topic)
     tell(result, options, screen)
     if options.mcap:
         with staged_bar(screen) as progress:

@@ -11,8 +11,10 @@ from dataclasses import asdict
 from shlex import quote
 
 from pprs_dynamics.app.api.first_model import first_model
+from pprs_dynamics.app.api.simulate import recording_rows
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
 from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
+from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.inference.diagnosis.next_step import SECOND
 from pprs_dynamics.system.files import write_text
@@ -37,6 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='joints with drives')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
+    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png'),
+                        help='picture to write: positions and efforts over time, as read')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
     if os.path.lexists(options.output):
         raise UsageError(f'{displayed(options.output)}: it exists already, and may have been '
                          'edited: delete it, or give another name for --output')
+    if options.picture and not options.recordings:
+        raise UsageError('--picture shows a RECORDING: one must be given')
     screen = console()
     drives = [name for name in options.drives.split(',') if name]
     if options.drives and not drives:
@@ -59,7 +65,11 @@ def run(options: argparse.Namespace) -> int:
     if model.recorded.columns is None and first.questions:
         screen.print(NOT_SURE)
         return 1
-    _, summaries = show_recordings(model, list(map(str, first.recordings)), None, screen)
+    recordings, summaries = show_recordings(model, list(map(str, first.recordings)), None, screen)
+    if options.picture and recordings:
+        save(plot_over_time(recordings[0].time, recording_rows(recordings[0], model.units)),
+             options.picture)
+        screen.print(f'picture: {shown(options.picture)}', soft_wrap=True)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     file = quote(options.output)

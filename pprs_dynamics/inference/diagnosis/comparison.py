@@ -221,30 +221,6 @@ class DriveComparison:
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Errors of another model on the same recordings.
-
-    Parameters
-    ----------
-    name : str
-        Of its file.
-    drives : mapping of str to float
-        Root of the mean squared error of each drive [N or N m].
-    rms : float
-        The same over all drives.
-    """
-
-    name: str
-    drives: Mapping[str, float]
-    rms: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return name and errors."""
-        return {'name': self.name, 'overall': {'rms': self.rms},
-                'drives': {name: {'rms': value} for name, value in self.drives.items()}}
-
-
-@dataclass(frozen=True)
 class Comparison:
     """Errors of all drives, and of all together.
 
