@@ -253,3 +253,14 @@ def test_loads_with_a_bit_for_their_sign_are_told(arm: DriveModel) -> None:
     time, q, _, effort = run(4)
     load = np.round(np.abs(20 * effort)) + 512 * (effort < 0)
     assert 'sign is bit 9 (512)' in told(arm, time, q, load)
+
+
+def test_a_joint_that_moves_no_inertia_is_not_driven(tmp_path: Path) -> None:
+    tip = ('<joint name="roll" type="revolute"><parent link="fore"/><child link="tip"/><axis '
+           'xyz="0 0 1"/><limit lower="-3" upper="3" effort="9" velocity="6"/></joint><link '
+           'name="tip"><inertial><mass value="0.2"/><origin xyz="0 0 0.04"/><inertia ixx="0" '
+           'iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>')
+    (tmp_path / 'arm.urdf').write_text(ARM.replace('</robot>', tip))
+    first = first_model(tmp_path / 'arm.urdf', output=tmp_path / 'arm.yaml')
+    assert first.model.drives == DRIVES
+    assert any(note.startswith('roll: no link') for note in first.notes)

@@ -31,7 +31,6 @@ from pprs_dynamics.inference.readings.table import (
     CURRENT,
     EFFORT,
     POSITION,
-    SHARE,
     VELOCITY,
     WORDS,
 )
@@ -217,6 +216,11 @@ def first_model(
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
                      'to drive them, list them with friction: {motors: …}')
+    idle = [] if drives else [name for name in chosen if _moves_nothing(description, name)]
+    if idle and len(idle) < len(chosen):
+        chosen = tuple(name for name in chosen if name not in idle)
+        notes.append(f'{", ".join(idle)}: no link with an inertia moves about it, so that it is '
+                     'not driven')
     by_numbers = False
     if contents.joints and not names:
         names = _by_numbers(contents, chosen)
@@ -284,7 +288,7 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
 
 
 def _questions_of_names(draft: FirstModel) -> list[str]:
-    """Return questions about commands, and about shares of a torque that a file does not say."""
+    """Return questions about commands."""
     chosen = [column for drive in draft.drives for kind in (POSITION, EFFORT) if isinstance(
         column := draft.columns.get(drive, {}).get(kind), str)]
     commands = [column for column in chosen if {*words_of(column)} & COMMANDS]
@@ -292,11 +296,6 @@ def _questions_of_names(draft: FirstModel) -> list[str]:
         return [f'{", ".join(commands)}: commands by their names, where the measured columns are '
                 'not known. Write their names in place of these, or, if no effort was measured, '
                 f'{EFFORT_KIND}: {COMMANDED}']
-    shares = [column for column in chosen if f'<{SHARE}>' in words_of(column)]
-    if shares:
-        return [f'{", ".join(shares)}: a share of a torque or force that the file does not name. '
-                'Write effort_scale: 0.01 times that (of per mille 0.001 times), as in '
-                f'columns: {{{draft.drives[0]}: {{effort_scale: 0.3}}}}']
     return []
 
 
@@ -354,6 +353,19 @@ def _drives(description: Description, path: Path, is_mjcf: bool, branch: Branch,
             f'{path}: it has loops, so not every joint is driven: give a RECORDING that names '
             'those that are, or --drives JOINT,JOINT,…')
     return found
+
+
+def _moves_nothing(description: Description, name: str) -> bool:
+    """Return whether a joint moves no link that has an inertia about it."""
+    joint = description.joints[name]
+    below = [joint.child]
+    for link in below:
+        below += [each.child for each in description.joints.values() if each.parent == link]
+    mass, *_, xx, xy, yy, xz, yz, zz = description.links[joint.child]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    found = mass if joint.kind == PRISMATIC else joint.axis @ inertia @ joint.axis
+    return not (found + joint.armature > 0 or any(
+        description.links[link][0] > 0 for link in below[1:]))
 
 
 def _actuated(path: Path) -> set[str]:

@@ -30,14 +30,15 @@ from pprs_dynamics.inference.readings.findings import (
     OtherReading,
     find_no_measurements,
     find_other_velocities,
+    find_shares,
     find_sign_bit,
     find_unsigned,
     findings_of,
+    knows_forces,
     lines_of,
     near,
     velocity_factors,
 )
-from pprs_dynamics.inference.readings.names import is_share
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -45,7 +46,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect, Indices
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.recorded_names import CURRENT
 
 PLAIN = 'all is as the model file says'
 
@@ -128,6 +128,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
             likely[0].reading.time_unit if likely else 1.0))
+    mistakes += find_shares(model)
     evidence, excerpt = search.evidence(search.rows[0]), search.excerpts.get(1.0)
     if evidence is None or excerpt is None or any(
             isinstance(mistake, OtherReading) for mistake in mistakes):
@@ -172,10 +173,7 @@ class Search:
         self.is_first = is_first or efforts is not None
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
-        # Of currents without a known gain, and shares of an unknown torque, no force is known:
-        # masses and units say nothing.
-        self.has_gain = (model.effort_kind != CURRENT or model.knows_currents) and not any(
-            map(is_share, columns))
+        self.has_gain = knows_forces(model)  # else masses and units say nothing
         self.masses = table.MASSES if self.has_gain else np.inf
         # Recorded velocities over the derivatives of positions.
         self.factors = velocity_factors(self.excerpts[1.0]) if 1.0 in self.excerpts else {}

@@ -19,6 +19,7 @@ from pprs_dynamics.inference.readings.evidence import (
     effort_contents,
     gravity_in,
 )
+from pprs_dynamics.inference.readings.names import is_share
 from pprs_dynamics.inference.readings.table import Reading, named
 from pprs_dynamics.inference.residuals.excerpt import Excerpt
 from pprs_dynamics.measurement.files.recording import Recording, signed
@@ -301,6 +302,24 @@ def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evi
 # ------------------------------------------------------------------------------- measurements
 
 
+def knows_forces(model: DriveModel) -> bool:
+    """Return whether efforts are forces: currents without a gain and shares are none."""
+    return (model.effort_kind != recorded_names.CURRENT or model.knows_currents) and not any(
+        find_shares(model))
+
+
+def find_shares(model: DriveModel) -> Iterator[OtherReading]:
+    """Yield efforts that are a share of a torque or force that no one has named."""
+    group = [d for d, drive in enumerate(model.drives) if is_share(_as_read(model, drive))]
+    if group:
+        named_so = ', '.join(str(_as_read(model, model.drives[d]).names['effort']) for d in group)
+        yield OtherReading.of(
+            'effort_share', model.drives, group,
+            f'{named_so}: a share of a torque or force that the file does not name',
+            f'effort_scale: 0.01 times that (of per mille 0.001 times), as in columns: '
+            f'{{{scalar(model.drives[group[0]])}: {{effort_scale: 0.3}}}}')
+
+
 def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
                          ) -> tuple[NoMeasurement, ...]:
     """Return what efforts look like that are no measurement, a finding for each kind.
@@ -322,6 +341,8 @@ def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
                  for content in contents.values())
     moves = any(content.inertia_doubt < table.LEAST_SHARE and not content.lacks_inertia
                 for content in contents.values())
+    # Forces of an unknown size cannot be compared with a model's.
+    weighs, moves = (each or not knows_forces(model) for each in (weighs, moves))
     excluded = ({table.WITHOUT_GRAVITY, table.EXTERNAL} if weighs else set()) | (
         {table.COMMAND, table.POSITION_ERROR, table.EXTERNAL} if moves else set())
     kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}

@@ -24,13 +24,10 @@ class Links:
     correlation, slope : (M, M) arrays
         Of column j with the derivative of column i, over steps of several lengths; NaN where one
         of them does not move.
-    alike : (M, M) array
-        Correlation of the changes of columns.
     """
 
     correlation: Array
     slope: Array
-    alike: Array
 
     @classmethod
     def of(cls, values: Array, time: Array) -> Links:
@@ -42,7 +39,7 @@ class Links:
         known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
         values, time = running_on(values[known]), time[known]
         count = values.shape[1]
-        best = [np.full((count, count), np.nan) for _ in range(3)]
+        best = [np.full((count, count), np.nan) for _ in range(2)]
         if len(time) < table.LEAST_ROWS:
             return cls(*best)
         steps = np.diff(time)[:, None]
@@ -55,13 +52,11 @@ class Links:
                 sizes, areas = (np.sqrt(np.sum(each ** 2, axis=0)) for each in (change, covered))
                 product = change.T @ covered
                 found = product / np.outer(sizes, areas)
-                slope = np.outer(1 / sizes, areas) / np.where(found == 0, np.nan, found)
-                alike = change.T @ change / np.outer(sizes, sizes)
             better = ~(np.abs(found) <= np.abs(best[0])) & np.isfinite(found)
             slope = (np.sum(covered ** 2, axis=0)[None, :]
                      / np.where(product == 0, np.nan, product))
             best = [np.where(better, new, old) for new, old in zip(
-                (found, slope, alike), best, strict=True)]
+                (found, slope), best, strict=True)]
         return cls(*best)
 
 
@@ -141,7 +136,9 @@ def _layouts_of(links: Links, values: Array, blocks: list[list[int]], turns: Seq
         # What is asked for moves as what is measured.
         group = [k for k in still if alike[b, k]]
         q = group[measured(values, [blocks[k] for k in group])]
-        best = max(np.flatnonzero(is_rate[b]).tolist(), key=lambda k: rates[b, k], default=None)
+        # An effort may follow what was asked for as a velocity does, but less than one does.
+        best = max(np.flatnonzero(is_rate[group].any(axis=0)).tolist(),
+                   key=lambda k: float(rates[group, k].max()), default=None)
         speeds = [] if best is None else [k for k in numbers if alike[best, k]]
         v = speeds[measured(values, [blocks[k] for k in speeds])] if speeds else None
         used = {*group, *speeds}
@@ -173,7 +170,9 @@ def move_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> boo
 
 def lag(values: Array, other: Array) -> int | None:
     """Return by how many samples other values come later; None where they do not move alike."""
-    first, second = np.diff(np.nan_to_num(values)), np.diff(np.nan_to_num(other))
+    values, other = np.nan_to_num(values), np.nan_to_num(other)
+    step = max(_step(values), _step(other))
+    first, second = (each[step:] - each[:-step] for each in (values, other))
     count = len(first) - table.LONGEST_LAG
     if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
         return None
@@ -182,6 +181,14 @@ def lag(values: Array, other: Array) -> int | None:
              for k in range(table.LONGEST_LAG)}
     best = max(found, key=lambda lag: found[lag])
     return best if found[best] > table.COPY else None
+
+
+def _step(values: Array) -> int:
+    """Return the samples in which a column changes by many of the counts that it has."""
+    moved = np.abs(np.diff(values))
+    count = np.min(moved, where=moved > 0, initial=np.inf)
+    return next((step for step in table.LENGTHS_OF_STEPS[:4] if np.std(
+        values[step:] - values[:-step]) > table.COARSE * count), 1)
 
 
 def measured(values: Array, blocks: Sequence[Sequence[int]]) -> int:

@@ -187,6 +187,7 @@ SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
 NO_EFFORT = 0.25  # residual of a column that is none, beside one with less
 LEAST_ROWS = 30
+COARSE = 8.0  # counts of an encoder by which a column changes, so that rounding does not matter
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
 SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
