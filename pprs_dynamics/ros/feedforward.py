@@ -216,11 +216,14 @@ class FeedforwardNode(ManagedNode):
         self._send_setpoint(answer, request.first_stamp)
         self._sent = None
         if self._joint_trajectory.get_subscription_count():
-            drives = self._sent = self._feedforward.ending_at_rest(
+            drives = self._feedforward.ending_at_rest(
                 answer, self._settings.node_values['stop_time'])
             self._has_sent = True
             self._joint_trajectory.publish(drives.message(request.start, self._names))
             left = request.start + int(drives.offsets[-1]) - self.get_clock().now().nanoseconds
+            timeout = self._settings.node_values['command_timeout']
+            # A controller discards what has ended, and never goes to its last pose.
+            self._sent = drives if left > -timeout * NANOSECONDS else None
             self._controller.sent(drives.drive_motion[0], left / NANOSECONDS,
                                   not drives.ends_at_rest)
         for name, each in self._parts.items():
@@ -338,8 +341,8 @@ class FeedforwardNode(ManagedNode):
     def _do_timeout_action(self) -> str:
         """Send what the action says on every topic, once, and return it in words.
 
-        The pose that is held is that of the trajectory at the present ROS time: the robot is
-        nowhere else.
+        Efforts are those of the pose on the path at the present ROS time. Who follows
+        `~/joint_command` has got no setpoint but the first of the trajectory, and stays there.
         """
         action = self._settings.node_values['timeout_action']
         left = 0 if self._watchdog is None else self._watchdog.left
@@ -348,8 +351,9 @@ class FeedforwardNode(ManagedNode):
         gravity = action == HOLD_GRAVITY
         try:
             held = self._feedforward.hold(gravity, left)
+            setpoint = self._feedforward.hold_setpoint(gravity)
             self._command(held)
-            self._send_setpoint(held, self.get_clock().now().nanoseconds)
+            self._send_setpoint(setpoint, self.get_clock().now().nanoseconds)
             controller = self._end_trajectory(held, left, gravity)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'

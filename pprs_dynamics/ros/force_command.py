@@ -355,6 +355,14 @@ class Feedforward:
         path, now = _path_of(last), (int(last.request.offsets[-1]) - left) / NANOSECONDS
         return self.hold_at(path.at(np.array([now])).position[0], gravity)
 
+    def hold_setpoint(self, gravity: bool) -> ForceCommand:
+        """Return the command that holds the first pose of the last accepted trajectory at rest.
+
+        Parameters and errors as `hold`.
+        """
+        request = self._accepted().request
+        return self._at_rest(request._replace(motion=request.motion[:1]), gravity)
+
     def stop(self, left: int, duration: float, gravity: bool) -> DriveTrajectory:
         """Return a trajectory along the last accepted one that comes to rest.
 

@@ -17,6 +17,8 @@ from monitor_bench import MonitorBench
 from node_bench import bench
 from rclpy.parameter import Parameter
 
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+
 MOTION = random_motion(np.random.default_rng(11), 3)
 ONE = MOTION[:1]
 
@@ -43,6 +45,25 @@ def test_feedforward_rejects_counts_tells_and_goes_on(package: ModuleType, fault
             assert node.answer(message_of(ONE)) == answer
             node.wait_for_status(level='OK', code='OK')
             assert node.bench.status[-1]['counters']['EFFECT'] == 3 * count
+
+
+@pytest.mark.nodes
+def test_an_effect_that_fails_in_mid_path_leaves_the_path_to_the_controller(
+    package: ModuleType,
+) -> None:
+    path = HelicalPath()
+    motion = path.motion(np.arange(1.0, path.duration + 0.1, 0.05))
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        node.answer(message_of(motion))
+        assert node.bench.spin_until(lambda: node.joint_trajectory and node.joint_command)
+        given, = node.joint_command
+        fail(package, 'columns')
+        node.send(message_of(motion[5:]))
+        said = node.wait_for_status(level='ERROR', code='EFFECT')['message']
+        assert 'a trajectory controller completes its trajectory' in said
+        assert node.bench.spin_until(lambda: len(node.joint_command) == 2)
+        np.testing.assert_allclose(node.joint_command[-1].position, given.position, atol=EQUAL)
+        assert len(node.joint_trajectory) == 1
 
 
 @pytest.mark.nodes

@@ -72,7 +72,9 @@ def test_a_stop_after_a_slow_answer_holds_the_pose_of_the_present_time(
     """As the first answer of a node that still compiles its equations."""
     times = np.arange(1.0, 4.0, 0.01)
     motion = HelicalPath().motion(times)
-    path = DriveModel.load().drive_forces(motion).mechanism.position
+    model = DriveModel.load()
+    efforts = model.drive_forces(
+        PlatformMotion.at_rest(motion.position, motion.orientation)).total
 
     def slow(model: DriveModel, *arguments: object) -> object:
         time.sleep(0.6)
@@ -84,9 +86,21 @@ def test_a_stop_after_a_slow_answer_holds_the_pose_of_the_present_time(
         node.answer(message_of(motion))
         monkeypatch.undo()
         node.node.trigger_deactivate()
-        assert node.bench.spin_until(lambda: len(node.joint_command) == 2)
-        held = np.array(node.joint_command[-1].position)
-        assert times[np.abs(path - held).max(axis=1).argmin()] > 1.55
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        held = np.array(node.commands[-1].data)
+        assert times[np.abs(efforts - held).max(axis=1).argmin()] > 1.55
+
+
+def test_a_path_that_ended_long_ago_sends_no_controller_to_its_end() -> None:
+    motion = HelicalPath().motion(np.arange(1.0, 2.0, 0.01))
+    with feedforward_bench(command_timeout=TIMEOUT, max_age=0.0) as node:
+        past = conversions.time(node.node.get_clock().now().nanoseconds - 60 * 10 ** 9)
+        node.answer(message_of(motion, past))
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)  # stale at once
+        node.bench.spin_for(0.3)
+        assert len(node.joint_trajectory) == 1  # which a controller discards
+        first, last = node.joint_command
+        np.testing.assert_allclose(last.position, first.position, rtol=0, atol=EQUAL)
 
 
 @pytest.mark.parametrize('stamped', [False, True], ids=['no stamp', 'stamp of this day'])

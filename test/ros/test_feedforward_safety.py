@@ -88,8 +88,9 @@ def test_a_stale_command_is_acted_on_once_and_the_next_message_recovers(action: 
                     lambda count=2 * round_number: len(node.joint_command) == count)
                 command = node.joint_command[-1]
                 np.testing.assert_allclose(command.velocity, 0, atol=0)
+                # The only setpoint that a drive without the trajectory has got.
                 np.testing.assert_allclose(
-                    command.position, FORCES.mechanism.position[-1], rtol=0, atol=EQUAL)
+                    command.position, FORCES.mechanism.position[0], rtol=0, atol=EQUAL)
                 # A trajectory controller would go on with the last point's speed for good.
                 assert node.bench.spin_until(
                     lambda count=2 * round_number: len(node.joint_trajectory) == count)
