@@ -181,13 +181,16 @@ def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
     assert found.to_dict()['effort_looks_like'] == WITHOUT_GRAVITY
 
 
-def test_forces_of_other_drives_are_no_effect_whatever_explains_them() -> None:
+@pytest.mark.parametrize('kind', ['drive_order', 'effort_unit'])
+def test_what_was_read_wrongly_is_no_effect_whatever_explains_it(kind: str) -> None:
     real = axis({'coulomb_friction': {'force': 4.0}})
-    order = OtherReading('drive_order', 1, 'the drives look recorded in another order')
-    found = diagnose(axis(), [replace(axis_recording(real), findings=(order,))], as_it_is=True)
+    doubt = OtherReading(kind, 1, 'the efforts look like those of another drive or unit')
+    found = diagnose(axis(), [replace(axis_recording(real), findings=(doubt,))], as_it_is=True)
     assert found.verdict == 'unknown'
     assert [effect.name for effect in found.effects] == ['coulomb_friction']
-    assert word_diagnosis(found).headline.startswith('The drives look recorded in another order. ')
+    words = word_diagnosis(found)
+    assert words.headline.startswith('The efforts look like those of another drive or unit. ')
+    assert words.command.startswith('pprs info ')
 
 
 def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:

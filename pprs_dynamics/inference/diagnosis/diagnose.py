@@ -16,7 +16,11 @@ from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.next_step import MOUNTING
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.findings import NoMeasurement, looks_like
+from pprs_dynamics.inference.readings.findings import (
+    NoMeasurement,
+    OtherReading,
+    looks_like,
+)
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate
@@ -75,10 +79,10 @@ def diagnose(
     since = None if reference is None else SinceReference.of(reference, table.first.design)
     found = replace(answer_of(table, validate), since=since)
     report(1.0)
-    orders = dict.fromkeys(finding.what for recording in recordings
-                           for finding in recording.findings if finding.kind == 'drive_order')
-    # Effects that explain the forces of other drives are none.
-    return replace(found, verdict='unknown', other_order='; '.join(orders)) if orders else found
+    # Effects that explain numbers in another unit, sign or order are none of the machine.
+    doubts = dict.fromkeys(finding.what for recording in (*recordings, *validate)
+                           for finding in recording.findings if isinstance(finding, OtherReading))
+    return replace(found, verdict='unknown', other_reading='; '.join(doubts)) if doubts else found
 
 
 @outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '

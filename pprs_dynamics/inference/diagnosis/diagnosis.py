@@ -305,8 +305,8 @@ class Diagnosis:
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
         Drives that stick and slip for much of the time: then nothing else is claimed.
-    other_order : str
-        How the columns look exchanged, if recordings are taken as they are; '' if they do not.
+    other_reading : str
+        Units, signs or order that recordings look to have, but were not read with; '' for none.
     since : SinceReference, optional
         The reference run since which changes are reported; None: what the model lacks.
     selection : ModelTable, optional
@@ -337,7 +337,7 @@ class Diagnosis:
     held_out_on: str = 'blocks'
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
-    other_order: str = ''
+    other_reading: str = ''
     since: SinceReference | None = None
     selection: ModelTable | None = field(default=None, repr=False, compare=False)
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # naming files needs no diagnosis
 MOUNTING = 'mounting'  # kind of a finding on the direction of gravity
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
+CHECK = 'Check units, signs and zeros, and that the file describes this machine'
 REPEAT = 'Repeat the motion and diagnose both recordings: an error that repeats is the machine'
 
 
@@ -106,14 +107,13 @@ def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = N
         What explains most of the squared error.
     """
     is_fitted = bool(reference_files(model.values, model.source))
-    check = 'Check units, signs and zeros, and that the file describes this machine'
     if not model.moves_joints or is_fitted:
         if worst is not None and worst.kind == 'friction':
             return ('Find out which effect explains this error by friction',
                     files.command('diagnose', '--report', 'why.html'))
-        return check, files.command('info')
+        return CHECK, files.command('info')
     words = ('The model has no friction yet. Fit inertia and friction first'
-             if _has_no_friction(model) else f'{check}. Then fit the model')
+             if _has_no_friction(model) else f'{CHECK}. Then fit the model')
     return words, files.command('fit', '--output', files.output('base.yaml'))
 
 
@@ -144,7 +144,9 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a faster motion, without stick-slip, and diagnose it. If the machine must '
                 'move so slowly, remove the cause first (grease, gains, a soft transmission)',
                 other)
-    if diagnosis.other_order or diagnosis.little or (
+    if diagnosis.other_reading:
+        return CHECK, files.command('info')
+    if diagnosis.little or (
             not is_change and _has_no_friction(diagnosis.model)
             and (diagnosis.verdict == 'unknown' or len(effects) > 1)):
         # Several effects of a model without any friction are at best a common fit.

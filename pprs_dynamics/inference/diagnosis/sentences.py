@@ -312,9 +312,9 @@ def _headline(diagnosis: Diagnosis) -> str:
     if diagnosis.effort_looks_like:
         what = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
         return f'{sentence("; ".join(what))} No effect is reported.'
-    if diagnosis.other_order:
-        return (sentence(diagnosis.other_order)
-                + ' If so, the listed effects come from the wrong order.' * bool(effects))
+    if diagnosis.other_reading:
+        return (sentence(diagnosis.other_reading)
+                + ' If so, the listed effects come from the wrong reading.' * bool(effects))
     if diagnosis.stick_slip:
         drives = listed([f'{drive} at {slip.frequency:.2g} Hz'
                          for drive, slip in diagnosis.stick_slip.items()])
