@@ -241,6 +241,9 @@ def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float)
     assert made.the_one(recording, 'impossible_effort').count == 10
     assert made.the_one(recording, 'impossible_velocity').count == 1
     dropped = made.the_one(recording, 'impossible_position')
+    # One remark each: what was discarded is not missing in addition.
+    assert not {finding.kind for finding in recording.findings} & {
+        'non_finite_position', 'effort_not_measured', 'missing_velocity'}
     assert 'far from all others, at 0.08 s; those samples are dropped' in dropped.text
     assert np.isnan(recording.effort).sum() == 10
     assert len(recording.time) == len(arrays['time']) - 1

@@ -62,7 +62,6 @@ class Judgement:
         self.findings = list(samples.findings)
         self.segments: tuple[slice, ...] = ()
         self._starts: Indices = np.zeros(1, dtype=np.int64)
-        self._mark_impossible()
         self._drop_non_finite()
         if not len(self.samples.time):
             return
@@ -109,22 +108,21 @@ class Judgement:
     def _split(self, firsts: Indices) -> None:
         self._starts = np.union1d(self._starts, firsts.astype(np.int64))
 
-    def _mark_impossible(self) -> None:
-        """Replace damaged numbers by NaN: beyond all measurement, or few and far from the rest."""
-        samples = self.samples
-        for quantity, unit, values in _quantities(samples):
-            bad = np.isfinite(values) & (np.abs(values) > LARGEST_MEASURED)
-            rest = np.where(bad, np.nan, values)
-            bad |= np.column_stack([signals.far_from_the_rest(column, SHORTEST_SEGMENT)
-                                    for column in rest.T])
-            if not np.any(bad):
-                continue
+    def _mark_impossible(self, quantity: str) -> Mask:
+        """Replace damaged numbers by NaN, and return where: beyond all measurement, or far off."""
+        samples, values = self.samples, self.samples.measured[quantity]
+        bad = np.isfinite(values) & (np.abs(values) > LARGEST_MEASURED)
+        rest = np.where(bad, np.nan, values)
+        bad |= np.column_stack([signals.far_from_the_rest(column, SHORTEST_SEGMENT)
+                                for column in rest.T])
+        if np.any(bad):
             largest = float(np.abs(values[bad]).max())
             values[bad] = np.nan
             article = 'an' if quantity == 'effort' else 'a'
-            unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), unit)
+            unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), UNITS[quantity])
             self._tell_values(f'impossible_{quantity}', bad, f'with {article} {quantity} of {{}} '
                               f'up to {largest:.3g} {unit}, far from all others,')
+        return bad
 
     def _drop_non_finite(self) -> None:
         bad_time = ~np.isfinite(self.samples.time)
@@ -132,6 +130,7 @@ class Judgement:
         self._keep(~bad_time)
         bad = ~np.isfinite(self.samples.position)
         self._tell_values('non_finite_position', bad, 'without a finite position of {}')
+        bad |= self._mark_impossible('position')
         self._keep(~np.any(bad, axis=1))
 
     def _order(self) -> None:
@@ -215,6 +214,7 @@ class Judgement:
             self._tell('no_effort', len(effort), 'there is no effort of any drive')
         else:
             self._tell_missing('effort_not_measured', effort, 'effort')
+            self._mark_impossible('effort')
             self._leave_out_unmeasured()
             effort[~self._first_of_held('effort', effort)] = np.nan
             self._leave_out_zeros()
@@ -225,6 +225,7 @@ class Judgement:
             return
         velocity[np.isinf(velocity)] = np.nan
         self._tell_missing('missing_velocity', velocity, 'velocity')
+        self._mark_impossible('velocity')
 
     def _leave_out_unmeasured(self) -> None:
         """Take out efforts that are 0 throughout a motion: no sensor measures them."""
