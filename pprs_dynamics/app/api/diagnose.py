@@ -31,6 +31,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_reco
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
 from pprs_dynamics.inference.diagnosis.quantities import (
     capitalised,
+    fall,
     listed,
     name_drives,
     plain,
@@ -190,17 +191,13 @@ def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """Return a row for each reported effect, and one for the model's numbers if they matter."""
     rows: list[tuple[str, ...]] = [
         (effect.name, sites(effect.drives, diagnosis, effect.places),
-         _fall(effect.error_before, effect.error_after),
-         _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+         fall(effect.error_before, effect.error_after),
+         fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
         for effect in diagnosis.effects]
     if is_refit(diagnosis):
         given = root_mean_square(diagnosis.residuals.error)
-        rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))
+        rows.append((REFIT, '', fall(given, diagnosis.refit), '', ''))
     return rows
-
-
-def _fall(before: float, after: float) -> str:
-    return f'{plain(before)} → {plain(after)}'
 
 
 def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:

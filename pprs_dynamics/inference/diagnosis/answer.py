@@ -331,8 +331,8 @@ def objection(ratio: float, gain: PredictiveGain | None, decisions: Decisions) -
         Of held-out data; None where it is not known.
     decisions : Decisions
     """
-    if ratio < 1 - decisions.error_rise:
-        return f'without its force the error is {1 - ratio:.0%} smaller'
+    if ratio <= 1:
+        return 'the error does not fall with its force'
     if gain is None or not np.isfinite(gain.certainty):
         return 'held-out data cannot confirm it'
     if gain.certainty < -decisions.sure:

@@ -110,8 +110,18 @@ def change(before: float, after: float, unit: str = 'N') -> str:
 
 def both_in_unit(before: float, after: float, unit: str = 'N') -> tuple[str, str]:
     """Return two efforts with their unit, and with as many digits as show their difference."""
-    digits = next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
+    digits = digits_apart(before, after)
     return in_unit(before, unit, digits), in_unit(after, unit, digits)
+
+
+def fall(before: float, after: float) -> str:
+    """Return two efforts as `A → B`, with as many digits as show their difference."""
+    return ' → '.join(plain(value, digits_apart(before, after)) for value in (before, after))
+
+
+def digits_apart(before: float, after: float) -> int:
+    """Return how many digits show the difference of two numbers, from 3 to 6."""
+    return next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
 
 
 def word_little(little: Mapping[str, float], after: str = '') -> str:

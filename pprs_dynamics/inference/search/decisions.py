@@ -59,9 +59,6 @@ class Decisions:
     # Residual of a drive over its noise, above which the verdict is unknown. No form of an effect
     # is off by so much.
     most_left: float = 5.0
-    # Relative rise of the error over its noise, up to which it does not rise. Reversals and slow
-    # noise are fitted but not part of the model.
-    error_rise: float = 0.01
     # How near a set must come to the best to be listed as its rival [deviance]. Odds of 150 to 1.
     rival_margin: float = 10.0
     # How nearly an effect must pay to be listed as a suspect [deviance]. Odds of 12 to 1 against
