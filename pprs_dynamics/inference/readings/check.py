@@ -428,9 +428,9 @@ class Search:
         """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
         effort = np.sqrt(np.mean(np.nan_to_num(excerpt.effort[:, reading.efforts]) ** 2, axis=0))
         # As recorded: in a larger unit a drive at rest would move, and count for that unit.
-        moves = (self.evidence(self.rows[0]) or evidence).moves(self.model)[reading.positions]
-        sizes = np.maximum(effort / max(effort.max(), 1e-300),
-                           evidence.size / max(evidence.size.max(), 1e-300))
+        recorded = self.evidence(self.rows[0]) or evidence
+        moves, size = recorded.moves(self.model)[reading.positions], recorded.size
+        sizes = np.maximum(effort / max(effort.max(), 1e-300), size / max(size.max(), 1e-300))
         found = np.where((sizes > table.WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
         weights: Array = found * (moves if np.any(moves & (found > 0)) else 1.0)
         return weights
