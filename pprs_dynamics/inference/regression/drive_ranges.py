@@ -19,6 +19,8 @@ from pprs_dynamics.physics.effects.laws.elastic_joint import load_by_windup
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
+# Of the effort's variance; efforts that follow the motion less are as much like it at any delay.
+LEAST_ALIKE = 0.5
 
 
 def drive_range(model: DriveModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
@@ -51,7 +53,8 @@ def _delay(recording: FullRate, drive: int) -> float:
 
     By the multiple correlation with the model's effort and what a model may lack most of (dry and
     viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
-    explains little is like nothing by itself.
+    explains little is like nothing by itself. Where they explain less than
+    `LEAST_ALIKE` it is 0.
     """
     part = max(recording.segments, key=lambda segment: segment.stop - segment.start)
     time = recording.time[part]
@@ -75,7 +78,10 @@ def _delay(recording: FullRate, drive: int) -> float:
     sums = np.concatenate((np.zeros((*sums.shape[:2], 1)), sums), axis=2)
     grams = (sums[..., len(inner):] - sums[..., :-len(inner)]).transpose(2, 0, 1)
     explained = np.einsum('kl,lkm,ml->l', alike, np.linalg.pinv(grams, 1e-9, hermitian=True), alike)
-    return round(float((most - np.argmax(explained)) * step), 9)  # whatever the clock's origin
+    best = int(np.argmax(explained))
+    if explained[best] < LEAST_ALIKE * (inner @ inner):
+        return 0.0
+    return round(float((most - best) * step), 9)  # whatever the clock's origin
 
 
 @dataclass(frozen=True)
