@@ -427,11 +427,6 @@ def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     return frozenset(candidate.key for candidate in candidates)
 
 
-def names_of(model: DriveModel) -> int:
-    """Return how many effects the catalogue has for what a model is of."""
-    return sum(map(model.offers, catalogue().values()))
-
-
 @dataclass(frozen=True)
 class PriorCosts:
     """Twice the logarithms of prior odds, for everything that is chosen.
@@ -459,7 +454,8 @@ class PriorCosts:
         Names are those of effects that can act in what it is a model of, those of other packages
         among them. Of errors without a model they are the package's own.
         """
-        names = len(CATALOGUE) if model is None else names_of(model)
+        names = len(CATALOGUE) if model is None else sum(
+            map(model.offers, catalogue().values()))
         return cls(names, len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:

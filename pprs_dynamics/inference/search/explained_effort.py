@@ -84,15 +84,11 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
         if _is_white_noise(residuals, d, decisions):
             is_little = np.nanvar(residuals.model[np.isfinite(effort), d]) > np.nanvar(effort)
         else:
-            is_little = share < decisions.explained * _beyond_noise(effort, noise.get(name, 0.0))
+            of_noise = noise.get(name, 0.0) ** 2 / max(float(np.nanvar(effort)), 1e-300)
+            is_little = share < decisions.explained * max(1 - of_noise, 0.0)
         if is_little:
             little[name] = float(np.nan_to_num(share))  # of a constant nothing is explained
     return dict(sorted(little.items(), key=lambda item: item[1]))
-
-
-def _beyond_noise(effort: Array, noise: float) -> float:
-    """Return the share of the variance of an effort (M,) that is not noise of an rms [N]."""
-    return max(1 - noise ** 2 / max(float(np.nanvar(effort)), 1e-300), 0.0)
 
 
 def _moves(model: DriveModel, residuals: Residuals, d: int) -> bool:

@@ -384,7 +384,7 @@ def _distance(first: Sequence[float], other: Sequence[float]) -> float:
 
 def _gain(fit: JointFit, blocks: Sequence[Block]) -> float:
     """Return by how much some columns lower the deviance, at the noise of the fit."""
-    places = np.concatenate([np.arange(len(fit.coefficients))[fit.places[b]] for b in blocks])
+    places = fit.index_of(blocks)
     c = fit.coefficients[places]
     return float(c @ np.linalg.solve(fit.covariance[np.ix_(places, places)], c))
 

@@ -60,7 +60,8 @@ class Scan:
         for effect, found in self.offers(base, drive).items():
             old = next((c for c in base.effects if c.effect is effect), None)
             # A body on another link is another explanation where all are asked for.
-            for offered in [found] if count is not None else _by_place(effect, found):
+            is_each = count is None and effect.is_of_one_place
+            for offered in [[offer] for offer in found] if is_each else [found]:
                 score, chosen = self.best_drives(effect, offered, old)
                 if score > least and chosen:
                     kept = tuple(c for c in base.candidates if c is not old)
@@ -109,11 +110,6 @@ class Scan:
                   for m in range(len(found))]
         best = int(np.argmax(scores))
         return float(scores[best]), [component for _, component in found[:best + 1]]
-
-
-def _by_place(effect: type[CatalogueEffect], found: Sequence[Scored]) -> list[Sequence[Scored]]:
-    """Return one list for each link or joint of an effect that is on one, else one of all."""
-    return [[scored] for scored in found] if effect.is_of_one_place else [found]
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
