@@ -361,7 +361,8 @@ class Feedforward:
         Parameters and errors as `hold`.
         """
         request = self._accepted().request
-        return self._at_rest(request._replace(motion=request.motion[:1]), gravity)
+        return self._at_rest(TrajectoryRequest(
+            request.motion[:1], request.start, request.offsets[:1]), gravity)
 
     def stop(self, left: int, duration: float, gravity: bool) -> DriveTrajectory:
         """Return a trajectory along the last accepted one that comes to rest.
