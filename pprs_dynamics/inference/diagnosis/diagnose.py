@@ -16,11 +16,7 @@ from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.next_step import MOUNTING
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.findings import (
-    NoMeasurement,
-    OtherReading,
-    looks_like,
-)
+from pprs_dynamics.inference.readings.findings import NoMeasurement, OtherReading, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate

@@ -116,7 +116,8 @@ def both_in_unit(before: float, after: float, unit: str = 'N') -> tuple[str, str
 
 def fall(before: float, after: float) -> str:
     """Return two efforts as `A → B`, with as many digits as show their difference."""
-    return ' → '.join(plain(value, digits_apart(before, after)) for value in (before, after))
+    digits = digits_apart(before, after)
+    return f'{plain(before, digits)} → {plain(after, digits)}'
 
 
 def digits_apart(before: float, after: float) -> int:

@@ -159,20 +159,24 @@ class Design:
             Called with the share that is done.
         """
         report, parts = progress or (lambda share: None), 2 * len(recordings)
-        return cls._evaluated(model, model, tuple(
+        design = cls._evaluated(model, model, tuple(
             reconstruct(model, recording, progress_of(report, k, parts))
-            for k, recording in enumerate(recordings)), report)._with_known_past()
+            for k, recording in enumerate(recordings)), report)
+        design._drop_unknown_past()
+        return design
 
-    def _with_known_past(self) -> Design:
-        """Return this without efforts that are of motion before or after their segment.
+    def _drop_unknown_past(self) -> None:
+        """Drop efforts that are of motion before or after their segment.
 
         If the efforts are late, those at the start of a segment are of a motion that is not known.
         """
+        # In place: the delays are in `covered`, which a copy would compute again.
         delays = np.array([covered.delay for covered in self.covered])
-        known = tuple(found.with_known_past(delays) for found in self.reconstructions)
-        measured = np.concatenate([found.treat(found.effort) for found in known])
-        return replace(self, reconstructions=known,
-                       residuals=replace(self.residuals, measured=measured))
+        if np.any(delays):
+            self.reconstructions = tuple(
+                found.with_known_past(delays) for found in self.reconstructions)
+            self.residuals = replace(self.residuals, measured=np.concatenate(
+                [found.treat(found.effort) for found in self.reconstructions]))
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.

@@ -53,8 +53,7 @@ def _delay(recording: FullRate, drive: int) -> float:
 
     By the multiple correlation with the model's effort and what a model may lack most of (dry and
     viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
-    explains little is like nothing by itself. Where they explain less than
-    `LEAST_ALIKE` it is 0.
+    explains little is like nothing by itself. Where they explain less than `LEAST_ALIKE` it is 0.
     """
     part = max(recording.segments, key=lambda segment: segment.stop - segment.start)
     time = recording.time[part]

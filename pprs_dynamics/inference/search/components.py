@@ -272,7 +272,8 @@ class Components:
 
     def block(self, component: Component) -> Block:
         """Return the columns of a component, transformed, with their prior."""
-        component = replace(component, is_shared=False)
+        if component.is_shared:
+            component = replace(component, is_shared=False)
         if component not in self._blocks:
             term = self.term(component)
             block = self.regression.term_block(term, component.names)

@@ -289,12 +289,12 @@ class Judgement:
                    f'{counted(count, "sample")} repeating every value of the one before', runs)
         for drive, name in enumerate(samples.drives):
             moves = not signals.is_constant(samples.position[:, drive])
-            for quantity, unit, values in _quantities(samples):
+            for quantity, values in samples.measured.items():
                 known = values[np.isfinite(values[:, drive]), drive]
                 if signals.is_constant(known) and (moves or quantity != 'velocity'):
                     self._tell(f'constant_{quantity}', 1,
                                f'the {quantity} of {name} is {known[0]:.6g} '
-                               f'{samples.unit_of(drive, unit)} throughout'
+                               f'{samples.unit_of(drive, UNITS[quantity])} throughout'
                                + (', while it moves' if quantity == 'velocity' else ''),
                                drives=[name])
             if not signals.is_constant(samples.effort[:, drive]):
@@ -321,11 +321,6 @@ class Judgement:
 
     def _named(self, mask: Mask) -> list[str]:
         return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
-
-
-def _quantities(samples: Samples) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Return what is measured, with its unit where drives push, and its values, (N, D)."""
-    return [(quantity, UNITS[quantity], values) for quantity, values in samples.measured.items()]
 
 
 def _percent(count: int, total: int) -> str:

@@ -20,8 +20,6 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 RIGID_BODY = 'rigid_body'
-# The model's own friction, in its drives and in its passive joints.
-ACTIVE_FRICTION, PASSIVE_FRICTION = 'active_friction', 'passive_friction'
 LOWER, UPPER, EFFORT = 0, 1, 2  # rows of the kernel's table
 
 
