@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import time
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -155,10 +156,12 @@ def work(item: str) -> str:
 def test_of_a_worker_that_is_killed_only_the_item_that_kills_it_is_lost() -> None:
     pytest.importorskip('distributed')
     with cluster(1) as client:
-        found = {item: (done, error) for item, done, error in run_each(
-            client, work, ['first', 'kills', 'last'])}
+        found = {}
+        for item, done, error in run_each(client, work, ['first', 'second', 'kills', 'last']):
+            found[item] = done, error
+            time.sleep(0.3)  # what is written slowly is not taken for lost
     assert 'KilledWorker' in found.pop('kills')[1]
-    assert found == {name: (name, None) for name in ('first', 'last')}
+    assert found == {name: (name, None) for name in ('first', 'second', 'last')}
 
 
 def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(

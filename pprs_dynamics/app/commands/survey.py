@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,6 +31,7 @@ ALLOWED_FAILURES = 2  # workers that an item may lose before it is given up
 REACHED_WITHIN = '15s'  # the scheduler
 SILENCE = '60s'  # without a message a worker is killed and started again
 MOST_SHOWN = 10  # errors
+STOPPED = 'the scheduler has stopped; what was written remains, and the same command does the rest'
 MOST_WORKERS = 1024
 EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
 
@@ -95,17 +97,27 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
     import distributed
 
     library: Any = distributed
-    running = {client.submit(work, item, pure=False): item for item in items}
-    for future in library.as_completed(running, loop=client.loop):
-        item = running.pop(future)
-        if future.status == 'finished':
-            yield item, future.result(), None
-        elif client.status != 'running' or future.status != 'error':
-            raise SchedulerError('the scheduler has stopped; what was written remains, and the '
-                                 'same command does the rest')
+    waiting, running = deque(items), dict[Any, Any]()
+    ended = library.as_completed(loop=client.loop, with_results=True, raise_errors=False)
+    while waiting or running:
+        try:
+            # A worker gets its next item when its last result is here: what a worker dies of
+            # takes no result with it.
+            while waiting and len(running) < max(1, sum(client.nthreads().values())):
+                item = waiting.popleft()
+                future = client.submit(work, item, pure=False)
+                running[future] = item
+                ended.add(future)
+            future, result = next(ended)
+        except (OSError, RuntimeError):
+            raise SchedulerError(STOPPED) from None
+        if future.status == 'error':
+            _, error, _ = result
+            yield running.pop(future), None, f'{type(error).__name__}: {error}'
+        elif client.status == 'running' and not future.cancelled():
+            yield running.pop(future), result, None
         else:
-            error = future.exception()
-            yield item, None, f'{type(error).__name__}: {error}'
+            raise SchedulerError(STOPPED)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
