@@ -43,7 +43,7 @@ from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Defect, Indices
+from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -109,7 +109,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     """
     if found := tuple(find_sign_bit(recording)):
         return found
-    search = Search(model, recording, is_first=is_first)
+    search = Search(model, recording, is_first)
     if wrong := [each for each in find_other_velocities(model, search.excerpts.get(1.0))
                  if each.kind == 'rate']:
         return tuple(wrong)
@@ -146,31 +146,27 @@ class Search:
     ----------
     model : DriveModel
     recording : Recording
-    efforts : (N, E) array, optional
-        Of all columns that may be efforts, in place of those of the recording.
     is_first : bool
         Whether nobody has checked the unit of the efforts yet.
     """
 
-    def __init__(self, model: DriveModel, recording: Recording, efforts: Array | None = None,
-                 is_first: bool = False) -> None:
+    def __init__(self, model: DriveModel, recording: Recording, is_first: bool) -> None:
         self.model = model
         times = _time_units(recording)
         self.excerpts = {
             unit: excerpt for unit in (1.0, *times) if (excerpt := excerpt_of(
-                recording, table.STRETCHES, unit, efforts)) is not None}
+                recording, table.STRETCHES, unit)) is not None}
         turning = [units.turns for units in model.units]
         self.rows = readings(model.drives, model.units, self._loads(), times,
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any, the more so where no name says that a column is an effort.
-        columns = [] if model.recorded.columns is None else [
-            *model.recorded.columns.drives.values()]
-        is_unnamed = efforts is not None or any(
-            isinstance(drive.names.get('effort'), int) for drive in columns)
+        is_unnamed = model.recorded.columns is not None and any(
+            isinstance(drive.names.get('effort'), int)
+            for drive in model.recorded.columns.drives.values())
         self.cost_of_constants = table.COST['drive_constant'] - (
             table.UNNAMED if is_unnamed else table.UNCHECKED if is_first else 0.0)
-        self.is_first = is_first or efforts is not None
+        self.is_first = is_first
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
         self.has_gain = knows_forces(model)  # else masses and units say nothing
@@ -217,15 +213,9 @@ class Search:
             upper - lower >= 2 * np.pi) & (np.linalg.norm(evidence.roots[:, 0, :, 1], axis=1) == 0)
         return np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
 
-    def best(self, efforts: Indices | None = None) -> Fit:
-        """Return the most likely reading; mistakes are added to it until none makes it likelier.
-
-        Parameters
-        ----------
-        efforts : (D,) int array, optional
-            Columns of the drives' efforts.
-        """
-        first = self.rows[0] if efforts is None else replace(self.rows[0], efforts=efforts)
+    def best(self) -> Fit:
+        """Return the most likely reading; mistakes are added to it until none makes it likelier."""
+        first = self.rows[0]
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
         self.start = start = self.fit(first) or Fit(first)
         self.fits = [start]

@@ -23,7 +23,6 @@ from pprs_dynamics.inference.readings.links import (
     layouts,
     measured,
     move_alike,
-    roughness,
     running_on,
     turn_of,
 )
@@ -314,86 +313,77 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
                 has_rate: bool, stamp: Columns, notes: list[str], model: DriveModel) -> Columns:
     """Return columns without names: positions by derivatives, efforts by what explains them."""
     count, values = len(joints), np.column_stack([each.values for each in series])
-    found = layouts(values, time, [units.turns for units in model.units])
+    found = layouts(values, time, count)
     if not found:
         raise GuessError(
             f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
             f'joints ({", ".join(joints)}): write columns: {{time: 1, {joints[0]}: '
             '{position: 2, effort: …}} with numbers from 1')
 
-    def read(layout: Layout, efforts: Sequence[int] = ()) -> Columns:
-        kinds = {POSITION: layout.positions, VELOCITY: layout.velocities, EFFORT: efforts}
-        return stamp | {(joint, kind): series[place].column for kind, places in kinds.items()
+    def read(blocks: Mapping[str, Sequence[int]]) -> Columns:
+        return stamp | {(joint, kind): series[place].column for kind, places in blocks.items()
                         for joint, place in zip(joints, places, strict=False)}
 
-    # Velocities that are exact leave no block for efforts: these are not in the file.
-    if found[0].velocities and not found[0].efforts:
-        found = found[:1]
-    fits: list[tuple[Fit, Layout, list[int]]] = []
+    fits: list[tuple[Fit, Layout]] = []
+    most = -0.5 * table.SAMPLES * count * np.log(table.CLOSEST)
     for layout in found:
-        # Velocities say at which rate they are the derivatives: a rate that is given may be wrong.
-        says_rate = not has_times and layout.velocities and not (
-            has_rate and near(layout.rate, (1.0, *table.VELOCITY_UNITS)))
-        for stamps in [time] * (has_times or has_rate or not layout.velocities) + (
-                [time / layout.rate] if says_rate else []):
-            fits += [(fit, layout, group) for fit, group in _fits(model, values, stamps, layout)]
-        # Hardly anything explains efforts as well by chance.
-        if any(fit.most_left < table.EXPLAINED and fit.prior < table.PLAUSIBLE
-               for fit, _, _ in fits):
+        # No effort is explained better than completely.
+        if fits and layout.evidence + most < max(fit.score for fit, _ in fits) - table.SURE:
             break
+        # Velocities say at which rate they are the derivatives: a rate that is given may be wrong.
+        says_rate = not has_times and layout.rate != 0 and not (
+            has_rate and near(layout.rate, (1.0, *table.VELOCITY_UNITS)))
+        for rate in [1.0] * (has_rate or not says_rate) + [layout.rate] * says_rate:
+            fits.append((_fit(model, values, time / rate, layout), layout))
     fits.sort(key=lambda each: -each[0].score)
-    likely = [each for each in fits if each[0].score > fits[0][0].score - table.SURE]
-    # Of positions that explain as much the smoothest, as no effort is.
-    layout = min([each[1] for each in likely] or found[:1],
-                 key=lambda layout: roughness(values[:, layout.positions]))
-    likely = [each for each in likely if each[1] is layout]
-    efforts = [group for *_, group in likely]
-    rivals = [each for each in likely if not move_alike(values, efforts[0], each[2])]
-    if likely and likely[0][0].left > table.GOOD_FIT:
-        rivals += [each for each in fits if each is not likely[0]]
+    best, layout = fits[0]
+    rivals = [each for fit, each in fits if (
+        fit.score > best.score - table.SURE or best.left > table.GOOD_FIT) and not all(
+            kind in each.blocks and kind in layout.blocks
+            and move_alike(values, layout.blocks[kind], each.blocks[kind])
+            for kind in (POSITION, EFFORT)) and each is not layout]
     if rivals:
-        raise AmbiguousColumns(joints, [read(of, group) for _, of, group in (likely[0], rivals[0])],
+        raise AmbiguousColumns(joints, [read(layout.blocks), read(rivals[0].blocks)],
                                'two readings of the columns are as likely')
-    if not efforts or (likely[0][0].least_left < table.NO_EFFORT < likely[0][0].most_left
-                       and not likely[0][0].is_rigid):
-        used = [*layout.positions, *layout.velocities]
-        _ask_for_one(joints, read(layout), [
+    if EFFORT not in layout.blocks or (best.least_left < table.NO_EFFORT < best.most_left
+                                       and not best.is_rigid):
+        known = {kind: block for kind, block in layout.blocks.items() if kind != EFFORT}
+        used = [place for block in known.values() for place in block]
+        _ask_for_one(joints, read(known), [
             each.column for place, each in enumerate(series) if place not in used])
     if len(series) == count and not count % 2:
         half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]
         raise AmbiguousColumns(
-            joints, [read(layout), stamp | dict(zip(half, (each.column for each in series),
+            joints, [read(layout.blocks), stamp | dict(zip(half, (each.column for each in series),
                                                     strict=True))],
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
-    chosen = efforts[measured(values, efforts)] if efforts else []
-    unused = [place for place in range(len(series)) if place not in {
-        *layout.positions, *layout.velocities, *chosen}]
-    told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}' for kind, places in (
-        (POSITION, layout.positions), (VELOCITY, layout.velocities), (EFFORT, chosen)) if places]
+    used = [place for block in layout.blocks.values() for place in block]
+    unused = [place for place in range(len(series)) if place not in used]
+    told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
+            for kind, places in layout.blocks.items()]
     notes.append('no header: ' + ', '.join(told) + (
         f'; {_span(series, unused)} not used' if unused else ''))
-    return {key: column for key, column in read(layout, chosen).items() if key not in stamp}
+    return {key: column for key, column in read(layout.blocks).items() if key not in stamp}
 
 
-def _fits(model: DriveModel, values: Array, time: Array, layout: Layout,
-          ) -> list[tuple[Fit, list[int]]]:
-    """Return how likely each block of efforts is with the positions of a layout."""
-    known = np.isfinite(values[:, layout.positions]).all(axis=1) & np.isfinite(time)
+def _fit(model: DriveModel, values: Array, time: Array, layout: Layout) -> Fit:
+    """Return how likely a layout is."""
+    position = values[:, layout.blocks[POSITION]]
+    known = np.isfinite(position).all(axis=1) & np.isfinite(time)
     known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
-    position = running_on(values[known][:, layout.positions])
+    position = running_on(position[known])
+    efforts = values[known][:, layout.blocks[EFFORT]] if EFFORT in layout.blocks else (
+        np.full(position.shape, np.nan))
     search = Search(model, Recording(
-        model.drives, time[known], position, None, np.full(position.shape, np.nan), name='',
-        segments=(slice(0, len(position)),)), values[known])
-    found = []
-    for group in layout.efforts:
-        fit = search.best(np.array(group))
-        evidence = search.evidence(fit.reading)
-        # A column that certainly holds inertia or weight is an effort in some unit.
-        rigid = evidence is not None and all(np.isfinite(evidence.factor(d, column))
-                                             for d, column in enumerate(group))
-        found.append((replace(fit, is_rigid=rigid), group))
-    return found
+        model.drives, time[known], position, None, efforts, name='',
+        segments=(slice(0, len(position)),)), is_first=True)
+    fit = search.best()
+    evidence = search.evidence(fit.reading)
+    # A column that certainly holds inertia or weight is an effort in some unit.
+    rigid = evidence is not None and all(np.isfinite(evidence.factor(d, d))
+                                         for d in range(len(model.drives)))
+    return replace(fit, is_rigid=rigid, score=fit.score + layout.evidence)
 
 
 def _ask_for_one(joints: Sequence[str], known: Columns, efforts: Sequence[Column]) -> None:

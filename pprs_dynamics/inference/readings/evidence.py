@@ -104,21 +104,11 @@ class Evidence:
         speed = np.sqrt(np.mean(motion.velocity ** 2, axis=0))
         direction = smooth_sign(motion.velocity, table.REVERSAL * speed + 1e-300)
         columns = np.stack([*forces, motion.velocity, direction, np.ones_like(position)], axis=2)
-        columns = np.where(followed[:, :, None], columns, 0.0)
-        known = np.isfinite(excerpt.effort)
-        effort = np.where(known, excerpt.effort, 0.0)
-        gram = np.zeros((position.shape[1], effort.shape[1], 7, 7))
-        gram[..., :6, :6] = np.einsum('ndij,ne->deij', columns[:, :, :, None]
-                                      * columns[:, :, None, :], known, optimize=True)
-        gram[..., 6, :6] = gram[..., :6, 6] = np.einsum('ndi,ne->dei', columns, effort)
-        gram[..., 6, 6] = np.einsum('nd,ne->de', followed.astype(float), effort ** 2)
-        sizes = np.sqrt(np.diagonal(gram, axis1=2, axis2=3))
-        used = np.where(sizes > 0, sizes, 1.0)
-        unit = gram / (used[..., :, None] * used[..., None, :])
-        unit[..., range(7), range(7)] = 1.0 + CONDITION ** 2
-        roots = np.swapaxes(np.linalg.cholesky(unit), 2, 3) * sizes[..., None, :]
-        samples, squares = gram[..., CONSTANT, CONSTANT], gram[..., EFFORT, EFFORT]
-        swing = squares - gram[..., CONSTANT, EFFORT] ** 2 / np.maximum(samples, 1)
+        roots = np.array([[_root(columns[:, d], followed[:, d], effort)
+                           for effort in excerpt.effort.T] for d in range(position.shape[1])])
+        samples, squares = (np.sum(roots[..., k] ** 2, axis=2) for k in (CONSTANT, EFFORT))
+        swing = squares - np.sum(roots[..., CONSTANT] * roots[..., EFFORT], axis=2) ** 2 / (
+            np.maximum(samples, 1))
         force = forces.sum(axis=0)
         return cls(roots, samples, squares, np.maximum(swing, 0.0) + table.WEAK ** 2 * squares,
                    np.sqrt(np.nanmean(force ** 2, axis=0)), speed, force,
@@ -198,6 +188,13 @@ class Evidence:
             columns.append(root[:, CONSTANT])
         factors, doubts, _ = fitted(root[:, EFFORT], columns)
         return factors[0] if abs(factors[0]) > table.CERTAIN * doubts[0] else np.nan
+
+
+def _root(columns: Array, followed: NDArray[np.bool_], effort: Array) -> Array:
+    """Return the triangle of the QR decomposition of columns and an effort where both are known."""
+    known = followed & np.isfinite(effort)
+    matrix = np.column_stack([columns[known], effort[known]])
+    return np.asarray(np.linalg.qr(np.vstack([matrix, np.zeros((7, 7))]), mode='r'))
 
 
 def _balance(model: DriveModel, position: Array) -> Array:

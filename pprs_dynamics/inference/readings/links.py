@@ -38,26 +38,24 @@ class Links:
         known = np.isfinite(values).all(axis=1) & np.isfinite(time)
         known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
         values, time = running_on(values[known]), time[known]
-        count = values.shape[1]
-        best = [np.full((count, count), np.nan) for _ in range(2)]
-        if len(time) < table.LEAST_ROWS:
-            return cls(*best)
+        unknown = np.full(2 * (values.shape[1],), np.nan)
         steps = np.diff(time)[:, None]
-        area = np.vstack([np.zeros(count), np.cumsum(
-            0.5 * (values[1:] + values[:-1]) * steps, axis=0)])
-        for length in (step for step in table.LENGTHS_OF_STEPS if step < len(time) // 4):
+        area = np.cumsum(np.vstack([0 * values[:1], 0.5 * (values[1:] + values[:-1]) * steps]),
+                         axis=0)
+        found = cls(unknown, unknown)
+        for length in (step for step in table.LENGTHS_OF_STEPS if (
+                step < len(time) // 4 and len(time) >= table.LEAST_ROWS)):
             change, covered = (each[length:] - each[:-length] for each in (values, area))
             change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
-            with np.errstate(divide='ignore', invalid='ignore'):
-                sizes, areas = (np.sqrt(np.sum(each ** 2, axis=0)) for each in (change, covered))
-                product = change.T @ covered
-                found = product / np.outer(sizes, areas)
-            better = ~(np.abs(found) <= np.abs(best[0])) & np.isfinite(found)
-            slope = (np.sum(covered ** 2, axis=0)[None, :]
-                     / np.where(product == 0, np.nan, product))
-            best = [np.where(better, new, old) for new, old in zip(
-                (found, slope), best, strict=True)]
-        return cls(*best)
+            sizes, areas = (np.sum(each ** 2, axis=0) for each in (change, covered))
+            product = np.where(both := np.outer(sizes, areas), change.T @ covered, np.nan)
+            correlation = product / np.sqrt(np.where(both, both, 1.0))
+            better = ~(np.abs(correlation) <= np.abs(found.correlation)) & np.isfinite(correlation)
+            with np.errstate(divide='ignore'):
+                slope = areas / product
+            found = cls(np.where(better, correlation, found.correlation),
+                        np.where(better, slope, found.slope))
+        return found
 
 
 def turn_of(values: Array) -> float:
@@ -76,89 +74,83 @@ def running_on(values: Array) -> Array:
 
 @dataclass(frozen=True)
 class Layout:
-    """A way in which columns are blocks of one quantity each.
+    """A hypothesis: columns are blocks of one quantity each.
 
     Parameters
     ----------
-    positions, velocities : list of int
-        Places of columns; of the latter there may be none.
-    efforts : list of list of int
-        Blocks that may be efforts: neither of the motion nor of what it was asked to be.
+    blocks : dict of str to list of int
+        Places of columns by quantity: positions, perhaps velocities and efforts.
     rate : float
-        Velocities over the derivatives of positions; NaN without velocities.
+        Velocities over the derivatives of positions; 0 without velocities.
+    evidence : float
+        That the other columns follow from the positions [nats].
     """
 
-    positions: list[int]
-    velocities: list[int]
-    efforts: list[list[int]]
+    blocks: dict[str, list[int]]
     rate: float
+    evidence: float
 
 
-def layouts(values: Array, time: Array, turns: Sequence[bool]) -> list[Layout]:
+def layouts(values: Array, time: Array, count: int) -> list[Layout]:
     """Return layouts of columns, (N, M), in blocks or in every so many, others before or after.
 
-    The smoothest positions with velocities come first. Of D drives some turn, the others slide.
+    Those with the most evidence come first, of equal ones those with the smoothest positions.
     """
-    links, width, count = Links.of(values, time), values.shape[1], len(turns)
+    links, width = Links.of(values, time), values.shape[1]
     number = width // count
-    if not number:
-        return []
-    found: dict[tuple[int, ...], Layout] = {}
-    for first in range(width - number * count + 1):
+    found: dict[str, Layout] = {}
+    for first in range(width - number * count + 1) if number else ():
         places = np.arange(first, first + number * count)
         for blocks in (places.reshape(number, count), places.reshape(count, number).T):
-            for layout in _layouts_of(links, values, blocks.tolist(), turns):
-                found.setdefault((*layout.positions, *layout.velocities), layout)
+            for layout in _layouts_of(links, values, blocks.tolist()):
+                found.setdefault(str(layout.blocks), layout)
     return sorted(found.values(), key=lambda layout: (
-        not layout.velocities, roughness(values[:, layout.positions])))
+        -layout.evidence, roughness(values[:, layout.blocks[table.POSITION]])))
 
 
-def _layouts_of(links: Links, values: Array, blocks: list[list[int]], turns: Sequence[bool],
-                ) -> Iterator[Layout]:
-    numbers = range(len(blocks))
+def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterator[Layout]:
+    """Yield which block may be the positions, and which other one, or none, the efforts."""
+    numbers, moves = range(len(blocks)), np.any(np.diff(values, axis=0), axis=0)
+    # A block that is the derivative of another, or the same earlier or later.
+    rates = np.array([[_nats(links.correlation[i, j]) for j in blocks] for i in blocks])
+    alike = np.array([[move_alike(values, i, j) for j in blocks] for i in blocks])
+    follows = np.where(alike, len(blocks[0]) * _nats(np.array([table.COPY])), rates)
 
-    def in_one_unit(block: Sequence[int], other: Sequence[int]) -> bool:
-        """Return whether slopes of drives that turn are the same, and of those that slide."""
-        slopes = np.log(np.maximum(links.slope[block, other], 1e-300))
-        return all(np.ptp(group) < table.NEAR_ONE for kind in {*turns} if len(
-            group := slopes[np.isfinite(slopes) & (np.array(turns) == kind)]))
+    def best_of(block: int, known: Sequence[int]) -> int:
+        """Return the measured one of those that move as a block does."""
+        group = [block, *(k for k in known if alike[block, k] and k != block)]
+        return group[measured(values, [blocks[k] for k in group])]
 
-    # A block has the derivatives of another where most joints that move have them.
-    rates = np.array([[_median(links.correlation[block, other]) for other in blocks]
-                      for block in blocks]).reshape(len(blocks), len(blocks))
-    np.fill_diagonal(rates, 0.0)
-    # What has a velocity is followed by it best: an effort may resemble a position.
-    is_rate = (rates > table.ALIKE) & (rates > rates.max(axis=0, initial=0.0) - table.AS_WELL)
-    is_rate &= np.array([[in_one_unit(block, other) for other in blocks] for block in blocks])
-    alike = np.array([[move_alike(values, block, other) for other in blocks] for block in blocks])
-    still = [k for k in numbers if not is_rate[:, k].any()]
-    for b in [k for k in still if is_rate[k].any()] or still:
-        # What is asked for moves as what is measured.
-        group = [k for k in still if alike[b, k]]
-        q = group[measured(values, [blocks[k] for k in group])]
-        # An effort may follow what was asked for as a velocity does, but less than one does.
-        best = max(np.flatnonzero(is_rate[group].any(axis=0)).tolist(),
-                   key=lambda k: float(rates[group, k].max()), default=None)
-        speeds = [] if best is None else [k for k in numbers if alike[best, k]]
-        v = speeds[measured(values, [blocks[k] for k in speeds])] if speeds else None
-        used = {*group, *speeds}
-        slope = np.nan if v is None else _median(links.slope[blocks[q], blocks[v]])
-        # Of what was asked for the derivatives are known, too.
-        for _ in range(2):
-            used |= {k for k in numbers for j in used if alike[j, k] or (
-                rates[j, k] > table.COPY and abs(_median(
-                    links.slope[blocks[j], blocks[k]]) / slope - 1) < table.SAME_UNIT)}
-        rest = [blocks[k] for k in numbers if k not in used]
-        if v is None or rest or rates[q, v] > table.COPY:
-            yield Layout(blocks[q], [] if v is None else blocks[v], rest, slope)
-        else:  # an effort may resemble a velocity, where friction is most of it
-            yield Layout(blocks[q], [], [blocks[k] for k in speeds], np.nan)
+    for q in numbers:
+        for effort in (None, *numbers) if best_of(q, numbers) == q else ():
+            if effort == q:
+                continue
+            # The tree of the likeliest links from the positions to all that follows from them.
+            known, rest, evidence = [q], {*numbers} - {q, effort}, 0.0
+            while rest and (best := max((follows[i, k], k) for i in known for k in rest))[0] > 0:
+                known.append(best[1])
+                rest.remove(best[1])
+                evidence += best[0]
+            found = {table.POSITION: blocks[q]}
+            if rates[q, known].any():
+                found[table.VELOCITY] = blocks[best_of(
+                    max(known, key=lambda k: float(rates[q, k])), known)]
+            if effort is not None:
+                found[table.EFFORT] = blocks[effort]
+            explained = [place for k in (*known, effort) if k is not None for place in blocks[k]]
+            evidence -= table.MASSES_MOST * float(np.sum(np.delete(moves, explained)))
+            slopes = links.slope[found[table.POSITION], found.get(table.VELOCITY, blocks[q])]
+            yield Layout(found, float(np.nanmedian(slopes)) if table.VELOCITY in found else 0.0,
+                         evidence)
 
 
-def _median(values: Array) -> float:
-    """Return the median over joints that move."""
-    moving = values[np.isfinite(values)]
-    return float(np.median(moving)) if len(moving) else 0.0
+def _nats(correlation: Array) -> float:
+    """Return the evidence for a link of the columns of all joints; 0 for none."""
+    moving = correlation[np.isfinite(correlation)]
+    if not len(moving) or np.median(moving) <= table.ALIKE:
+        return 0.0
+    return float(-0.5 * table.SAMPLES * np.sum(np.log(np.maximum(
+        1 - np.maximum(moving, 0.0) ** 2, table.CLOSEST))))
 
 
 def move_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:

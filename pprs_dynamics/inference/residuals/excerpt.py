@@ -30,8 +30,8 @@ class Excerpt:
         Position, velocity and acceleration of the drives, (N, D) [m, m/s, m/s^2].
     time : (N,) array
         [s]
-    effort : (N, E) array
-        [N]; NaN where it was not measured. Of the drives, or of all columns that may be theirs.
+    effort : (N, D) array
+        [N]; NaN where it was not measured.
     velocity : (N, D) array or None
         As recorded [m/s].
     """
@@ -43,7 +43,7 @@ class Excerpt:
 
 
 def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
-               efforts: Array | None = None) -> Excerpt | None:
+               ) -> Excerpt | None:
     """Return an excerpt; None where no stretch is long enough.
 
     Parameters
@@ -53,8 +53,6 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
         How many are taken at most, evenly over the recording.
     time_unit : float
         Unit of its times [s].
-    efforts : (N, E) array, optional
-        In place of those of the recording.
     """
     windows = [slice(first, min(first + LONGEST, part.stop)) for part in recording.segments
                for first in range(part.start, part.stop, LONGEST)
@@ -87,5 +85,5 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
         segments=tuple(segments))
     velocity = None if recording.velocity is None else means(recording.velocity[smooth.index])
     return Excerpt(motion, means(scaled.time[smooth.index, None])[:, 0],
-                   means((recording.effort if efforts is None else efforts)[smooth.index]),
+                   means(recording.effort[smooth.index]),
                    velocity)
