@@ -413,28 +413,10 @@ class Feedforward:
         return np.asarray(effort)
 
     def _checked(self, request: TrajectoryRequest, forces: Forces) -> ForceCommand:
+        """Return the command with clamped efforts; raise Rejection or LimitError where refused."""
         effort = self._scale * forces.total if self._scales else forces.total
         if self._ramp is not None:
             effort = self._ramped(request, effort)
-        if self._limits.allow(effort, forces.drive_motion):
-            return ForceCommand(request, forces, effort)
-        return self._clamped(request, forces, effort)
-
-    def _ramped(self, request: TrajectoryRequest, effort: Array) -> Array:
-        """Return efforts (N, D) on the way from those before a change."""
-        ramp, now = self._ramp, self._clock()
-        if ramp is None or ramp.is_over(now):
-            self._ramp = None
-            return effort
-        try:
-            motion = self._timed(request) if ramp.memory.has_memory else request.motion
-            return ramp.blended(motion, request.offsets, effort, now)
-        except PprsError:  # the model of before cannot follow: there is nothing to ramp from
-            self._ramp = None
-            return effort
-
-    def _clamped(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> ForceCommand:
-        """Return the command with clamped efforts; raise Rejection or LimitError where refused."""
         position, velocity, acceleration = forces.drive_motion
         for name, quantity in (('n effort', effort), (' drive velocity', velocity),
                                (' drive acceleration', acceleration)):
@@ -448,6 +430,19 @@ class Feedforward:
                 raise
             return ForceCommand(request, forces, self._limits.clamped(effort), str(error))
         return ForceCommand(request, forces, effort)
+
+    def _ramped(self, request: TrajectoryRequest, effort: Array) -> Array:
+        """Return efforts (N, D) on the way from those before a change."""
+        ramp, now = self._ramp, self._clock()
+        if ramp is None or ramp.is_over(now):
+            self._ramp = None
+            return effort
+        try:
+            motion = self._timed(request) if ramp.memory.has_memory else request.motion
+            return ramp.blended(motion, request.offsets, effort, now)
+        except PprsError:  # the model of before cannot follow: there is nothing to ramp from
+            self._ramp = None
+            return effort
 
     def _timed(self, request: TrajectoryRequest) -> Motion:
         """Return the motion on one time scale for all messages, which memories go by."""

@@ -185,7 +185,8 @@ class DriveControl:
                       + self._damping * (speed - velocity))
         else:
             self._wanted_speed = None
-        return self._delayed(self._limited(now, wanted))
+        self._delay_line.append(self._limited(now, wanted))
+        return self._delay_line[0]
 
     def _interpolated(self, position: Array, velocity: Array, age: float) -> tuple[Array, Array]:
         following, T = self._following, self._after
@@ -228,10 +229,6 @@ class DriveControl:
                            f'{unit}, {limits.effort_source} allows {limits.efforts[i]:g} {unit}')
         self._at_limit = over
         return effort
-
-    def _delayed(self, effort: Array) -> Array:
-        self._delay_line.append(effort)
-        return self._delay_line[0]
 
     def _fault(self, setpoint: Setpoint) -> str:
         for name in ('position', 'velocity', 'effort'):

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -78,41 +76,5 @@ def test_the_first_effort_over_its_limit_is_named(limits: DriveLimits) -> None:
             assert limits.effort_source in str(caught.value)
 
 
-@EACH
-def test_what_is_allowed_is_finite_and_within_all_limits(limits: DriveLimits) -> None:
-    lower, upper = limits.strokes
-    rates = np.ones_like(middle(limits))
-    efforts = np.tile(limits.efforts, (4, 1))
-
-    def allowed(force: np.ndarray, position: np.ndarray, velocity: np.ndarray = rates,
-                acceleration: np.ndarray = rates) -> bool:
-        return bool(limits.allow(force, (position, velocity, acceleration)))
-
-    def changed(table: np.ndarray, drive: int, value: float) -> np.ndarray:
-        other = table.copy()
-        other[3, drive] = value
-        return other
-
-    assert allowed(efforts, np.tile(lower, (4, 1)))
-    assert allowed(-efforts, np.tile(upper, (4, 1)))
-    for drive in range(len(limits.drives)):
-        assert not allowed(changed(efforts, drive, 1.001 * limits.efforts[drive]), middle(limits))
-        assert not allowed(changed(efforts, drive, -1.001 * limits.efforts[drive]), middle(limits))
-        assert not allowed(efforts, changed(middle(limits), drive, lower[drive] - 1e-3))
-        assert not allowed(efforts, changed(middle(limits), drive, upper[drive] + 1e-3))
-        for bad in (np.nan, np.inf, -np.inf):
-            assert not allowed(changed(efforts, drive, bad), middle(limits))
-            assert not allowed(efforts, changed(middle(limits), drive, bad))
-            assert not allowed(efforts, middle(limits), changed(rates, drive, bad))
-            assert not allowed(efforts, middle(limits), rates, changed(rates, drive, bad))
-
-
 def test_the_smaller_of_two_limits_counts() -> None:
     assert ARM.with_efforts([100.0, 100.0]).efforts.tolist() == [7.0, 100.0]
-
-
-def test_where_nothing_limits_efforts_an_infinite_one_is_not_allowed() -> None:
-    free = replace(ARM, efforts=np.full(2, np.inf))
-    rest = np.zeros((1, 2))
-    assert free.allow(np.array([[1e300, 0.0]]), (middle(ARM, 1), rest, rest))
-    assert not free.allow(np.array([[np.inf, 0.0]]), (middle(ARM, 1), rest, rest))

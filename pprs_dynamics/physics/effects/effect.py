@@ -32,8 +32,6 @@ class Parameter:
         Value where a model file is silent; required in the file without one.
     scale : float
         A size at which it matters, for numerical derivatives.
-    is_angle : bool
-        True for a phase: its size says nothing about how strong the effect is.
     turning : (float, float), optional
         Bounds in a drive that turns: radians for metres.
     expected : (float, float), optional
@@ -51,7 +49,6 @@ class Parameter:
     upper: float
     default: float | None = None
     scale: float = 1.0
-    is_angle: bool = False
     expected: tuple[float, float] | None = None
     turning: tuple[float, float] | None = None
     product: Product | None = None

@@ -35,12 +35,13 @@ from pprs_dynamics.physics.mechanism.state import (
 )
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
+    NO_FRICTION,
     RIGID,
     WORST_CONDITION,
+    InverseDynamicsResult,
     JointFriction,
     Loads,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 

@@ -20,8 +20,12 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.tree_equations import JOINT_EFFORT, TRANSMITTED
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    JOINT_EFFORT,
+    NO_FRICTION,
+    TRANSMITTED,
+    InverseDynamicsResult,
+)
 from pprs_dynamics.system.parallel import lazy
 
 Motion = JointMotion | PlatformMotion

@@ -45,12 +45,12 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     OF_CLOSURE,
     PASSIVE_OF,
     TRANSLATION,
+    Evaluation,
     Integers,
     Model,
     constraint_jacobian,
     link_jacobians,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation
 from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
 X, Y, Z = range(3)
@@ -185,11 +185,6 @@ class Closing:
             if (Y, Z, Z, Y) in kinds and np.min(along) < 0:
                 raise ModelError('robot.loops', name, 'have both frames the same way round: one '
                                  'is half a turn off at home')
-
-    def are_redundant(self, q: Array, free: Array) -> bool:
-        """Return whether the coordinates that are not free depend on each other."""
-        _, J = self.derivatives(q)
-        return _rank(J) > _rank(J[:, free])
 
     def mobility(self, q: Array, drives: Integers, moves: Array) -> Mobility:
         """Return what is free at a closed home.
@@ -405,13 +400,6 @@ class Structure:
         return joints | {loop.name: (-1, k) for k, loop in enumerate(self.loops)
                          if loop.kind in ROTATING}
 
-    @property
-    def passive(self) -> tuple[str, ...]:
-        """Joints that no drive moves by itself, in the order of the tables."""
-        driven = set(self.tables.drives.tolist())
-        return tuple(name for name, row in self.rows.items()
-                     if int(self.tables.coordinate[row]) not in driven)
-
 
 @dataclass
 class _Builder:
@@ -490,12 +478,9 @@ class _Builder:
         """Return the frame of the child of a locked joint in the parent's."""
         if joint.kind == FIXED:
             return joint.frame
-        position = self.stopped[joint.name] = self._locked_position(joint)
-        return joint.frame @ moved_along(joint, position)
-
-    def _locked_position(self, joint: Joint) -> float:
         leader, ratio, offset = self._leader(joint)
-        return ratio * self.locked[leader.name] + offset
+        position = self.stopped[joint.name] = ratio * self.locked[leader.name] + offset
+        return joint.frame @ moved_along(joint, position)
 
     def _add(self, parent: int, place: Frame, axis: Array, turns: bool) -> int:
         self.parent.append(parent)
@@ -668,7 +653,8 @@ def _home(closing: Closing, start: Array, free: Array) -> Array:
             q = closing.home(start, np.arange(len(start)))
         except ModelError:
             raise error from None
-        if closing.are_redundant(q, free):
+        _, J = closing.derivatives(q)
+        if _rank(J) > _rank(J[:, free]):  # those that are not free depend on each other
             return q
         raise
 

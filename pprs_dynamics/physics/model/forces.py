@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import EffectError, LimitError, WorkspaceError
-from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 RIGID_BODY = 'rigid_body'
-LOWER, UPPER, EFFORT = 0, 1, 2  # rows of the kernel's table
 
 
 class Forces:
@@ -168,10 +165,6 @@ class DriveLimits:
         """Lowest and highest position of each drive [m, rad], (D,) each."""
         return self.lower, self.upper
 
-    @cached_property
-    def _table(self) -> Array:
-        return np.array((self.lower, self.upper, self.efforts), dtype=float)
-
     def with_efforts(self, effort: Sequence[float]) -> DriveLimits:
         """Return these limits with the smaller of two limits on every drive's effort."""
         return replace(self, efforts=np.minimum(self.efforts, effort))
@@ -179,20 +172,6 @@ class DriveLimits:
     def clamped(self, forces: Array) -> Array:
         """Return efforts, (N, D), moved to the limit where they are over it."""
         return np.clip(forces, -self.efforts, self.efforts)
-
-    def allow(self, forces: Array, drive_motion: tuple[Array, ...]) -> bool:
-        """Return whether all is finite, and neither a stroke nor an effort is exceeded.
-
-        In a tenth of the time of `check_strokes` and `check_efforts`, which name what is exceeded.
-
-        Parameters
-        ----------
-        forces : (N, D) array
-            [N, N m].
-        drive_motion : three (N, D) arrays
-            Position, velocity and acceleration; all of it C-contiguous.
-        """
-        return bool(run(_are_allowed, forces, *drive_motion, self._table))
 
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, D), outside its stroke."""
@@ -214,16 +193,3 @@ class DriveLimits:
             raise LimitError(sample, self.drives[drive], float(forces[sample, drive]),
                              float(self.efforts[drive]), self.units[drive].effort,
                              self.effort_source)
-
-
-def _are_allowed(forces: Any, position: Any, velocity: Any, acceleration: Any, limits: Any) -> bool:
-    """Return whether all is finite and within a table of LOWER, UPPER and EFFORT, (3, D)."""
-    for s in range(len(forces)):
-        for i in range(limits.shape[1]):
-            force, q = forces[s, i], position[s, i]
-            # 0 times infinity or NaN is NaN.
-            if not (0.0 * force + 0.0 * velocity[s, i] + 0.0 * acceleration[s, i] == 0.0
-                    and limits[LOWER, i] <= q <= limits[UPPER, i]
-                    and abs(force) <= limits[EFFORT, i]):
-                return False
-    return True

@@ -121,7 +121,8 @@ def _claims(
     cos_u, u = state.links.cos_u, np.degrees(state.links.rod_angle)
     # A rod that leans down has a negative angle; upright is 90 degrees either way.
     crossed = bool(np.any(cos_u.min(axis=0) * cos_u.max(axis=0) < 0))
-    near = _approach_at(approaches[1], state, 1e-3)
+    near = float(np.nanmax(np.abs(_where_defined(
+        IndependentChainsFriction(approaches[1].blocks, 1e-3), state))))
     a, p1, p2 = _rms(active), _rms(first), _rms(second)
     passive_share = float(np.max(p1 / _rms(Q + friction)))
     agree = bool(np.allclose(first[:, 0], second[:, 0], atol=0.01, equal_nan=True))
@@ -150,11 +151,6 @@ def _claims(
               'not significant', f'{100 * passive_share:.1f} % of the drive force at most '
               '(rms over rms)', passive_share < 0.05),
     ]
-
-
-def _approach_at(effect: IndependentChainsFriction, state: MechanismState, cosine: float) -> float:
-    force = _where_defined(IndependentChainsFriction(effect.blocks, cosine), state)
-    return float(np.nanmax(np.abs(force)))
 
 
 def _where_defined(effect: ModelJointFriction, state: MechanismState) -> Array:

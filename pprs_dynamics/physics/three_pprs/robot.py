@@ -44,7 +44,6 @@ from pprs_dynamics.physics.mechanism.state import (
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
-from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
 from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Joints
@@ -368,8 +367,23 @@ def condition_number(geometry: Geometry, J: Array) -> Array:
     return number
 
 
+class Alike:
+    """Places of a 3-PPRS and of its tree: joints and links are three of a kind."""
+
+    radii: Mapping[str, float]
+    tool_place = BodyPlace('platform', (0.0, 0.0, 0.0), inf, is_spread=True)
+    link_places: tuple[BodyPlace, ...] = (
+        BodyPlace('rods', (0.0, 0.0, 0.0), inf, is_spread=True, links=RODS),)
+
+    @property
+    def passive_joints(self) -> tuple[PassiveJoint, ...]:
+        """The joints C_i, and the joints A_i."""
+        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE,
+                                  joints=joints) for name, joints in ALIKE.items())
+
+
 @dataclass(frozen=True)
-class ThreePprs:
+class ThreePprs(Alike):
     """The 3-PPRS; its members are those of `Mechanism`.
 
     Parameters
@@ -392,7 +406,7 @@ class ThreePprs:
     bounds: SingularityBounds = UNBOUNDED
     printed: bool = False
 
-    # Bodies and passive joints are three of a kind, and no two kinds are alike.
+    # No two kinds of bodies and passive joints are alike.
     structure: ClassVar[None] = None
     drives: ClassVar[tuple[str, ...]] = DRIVES
     motors: ClassVar[Mapping[str, tuple[float, ...]]] = {}
@@ -400,22 +414,6 @@ class ThreePprs:
     motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
     turning: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[str] = PLATFORM
-
-    @property
-    def passive_joints(self) -> tuple[PassiveJoint, ...]:
-        """The joints C_i, and the joints A_i."""
-        return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE,
-                                  joints=joints) for name, joints in ALIKE.items())
-
-    @property
-    def tool_place(self) -> BodyPlace:
-        """The centre of mass of platform and payload, where a payload is added."""
-        return BodyPlace('platform', (0.0, 0.0, 0.0), inf, is_spread=True)
-
-    @property
-    def link_places(self) -> tuple[BodyPlace, ...]:
-        """The rods, all three alike."""
-        return (BodyPlace('rods', (0.0, 0.0, 0.0), inf, is_spread=True, links=RODS),)
 
     @property
     def moved_mass(self) -> float:
@@ -492,21 +490,21 @@ class ThreePprs:
             float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
 
     def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
-                 has_state: bool = False) -> InverseDynamicsResult | None:
+                 has_state: bool = False) -> tree.InverseDynamicsResult | None:
         """Return the forces for a motion, friction included; see `Mechanism.one_pass`."""
         # Memory is what limits long motions: the rows that only a state reads take 12 % longer.
         rows = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
         table = np.empty((rows, len(motion), 6))
         if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
             return None
-        return InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
+        return tree.InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
         structure = tree_structure(self.geometry, self.masses, (*strokes, efforts))
         bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
         return Tree(structure, bodies, structure.inertial[bodies], np.zeros(COUNT), self.gravity,
-                    places=self)
+                    self.radii)
 
     # --- motion --------------------------------------------------------------------------------
 
@@ -556,7 +554,7 @@ class ThreePprs:
 
     def state(self, motion: PlatformMotion, reversal: Reversal,
               friction: Joints = FRICTIONLESS_JOINTS, closed: object = None,
-              found: InverseDynamicsResult | None = None) -> MechanismState:
+              found: tree.InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a platform motion; `found` as of `one_pass`.
 
         Raises
@@ -653,31 +651,8 @@ class ThreePprs:
             raise ModelError(key, value, 'leave masses greater than 0')
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Tree(Mechanism):
-    """A 3-PPRS as a mechanism, with joints and links that are alike.
-
-    Parameters
-    ----------
-    places : ThreePprs
-    """
-
-    places: ThreePprs
-
-    @property
-    def passive_joints(self) -> tuple[PassiveJoint, ...]:
-        """As of the closed form."""
-        return self.places.passive_joints
-
-    @property
-    def tool_place(self) -> BodyPlace:
-        """As of the closed form."""
-        return self.places.tool_place
-
-    @property
-    def link_places(self) -> tuple[BodyPlace, ...]:
-        """As of the closed form."""
-        return self.places.link_places
+class Tree(Alike, Mechanism):
+    """A 3-PPRS as a mechanism."""
 
 
 def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:

@@ -59,7 +59,7 @@ class CurrentGain(MeasurementEffect):
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,
                         scale=0.02, expected=(0.03, 0.03)),
               Parameter('phase', 'phi', 'rad', 'phase of the wave at position 0', -2 * math.pi,
-                        2 * math.pi, 0.0, scale=0.5, is_angle=True))
+                        2 * math.pi, 0.0, scale=0.5))
     shape = (Parameter('reference', 'T_0', 'degC', 'temperature at which the constant is the '
                        "model's", -1e4, 1e4, 25.0, scale=10.0),
              Parameter('pitch', 'p', 'm', 'distance between two waves', 1e-6, 10.0,

@@ -59,7 +59,7 @@ class EccentricEncoder(MeasurementEffect):
     is_of_position = True
     linear = (
         Parameter('amplitude', 'A', 'm', 'of the wave', 0.0, 0.1, scale=1e-4, turning=(0.0, 0.5)),
-        Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN, is_angle=True))
+        Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN))
     shape = (Parameter('pitch', 'p', 'm', 'travel of the drive in a turn of the encoder', 1e-6,
                        10.0, scale=1e-3),)
     waves = (Wave('amplitude', 'phase'),)

@@ -59,11 +59,9 @@ class ForceRipple(DriveEffect):
     name = 'force_ripple'
     linear = (
         Parameter('force', 'A', 'N', 'amplitude', 0.0, 1e6, scale=0.3),
-        Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN,
-                  is_angle=True),
+        Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN),
         Parameter('second', 'A_2', 'N', 'amplitude of the second harmonic', 0.0, 1e6, 0.0, 0.3),
-        Parameter('second_phase', 'phi_2', 'rad', 'its phase at position 0', -TURN, TURN, 0.0,
-                  is_angle=True))
+        Parameter('second_phase', 'phi_2', 'rad', 'its phase at position 0', -TURN, TURN, 0.0))
     shape = (Parameter('pitch', 'p', 'm', 'distance of one period', 1e-6, 10.0, scale=1e-3),)
     scanned = ('sine', 'cosine')
     is_wave = True
