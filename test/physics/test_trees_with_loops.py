@@ -384,12 +384,13 @@ def test_it_solves_what_lapack_solves(seed: int) -> None:
         elif k > 9:
             A[:3, :2] *= 1e-9
         B = random.normal(size=(SIZE, RIGHT_SIDES))
-        left, right = A.copy(), B.copy()
-        determinant = solve(left, right)
+        table = np.hstack((A, B, B))
+        determinant = solve(table, SIZE, SIZE + RIGHT_SIDES, SIZE + 2 * RIGHT_SIDES)
         assert determinant == pytest.approx(np.linalg.det(A), rel=1e-8)
         expected = np.linalg.solve(A, B)
         scale = np.linalg.cond(A) * np.abs(expected).max()
-        assert np.abs(right - expected).max() < 1e-13 * scale
+        assert np.abs(table[:, -RIGHT_SIDES:] - expected).max() < 1e-13 * scale
+        assert np.array_equal(table[:, SIZE:-RIGHT_SIDES], B)
 
 
 # Links and joints that no motion tells apart.

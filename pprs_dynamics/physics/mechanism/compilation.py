@@ -19,7 +19,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from pprs_dynamics.physics.mechanism.tree_equations import elements
+from pprs_dynamics.physics.mechanism.vectors import elements
 
 PACKAGE = 'pprs_dynamics'
 

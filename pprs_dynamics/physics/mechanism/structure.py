@@ -13,7 +13,7 @@ compare.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -42,8 +42,8 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     AXES,
     KIND,
     LOOP,
+    MEASURE,
     OF_CLOSURE,
-    PASSIVE_OF,
     TRANSLATION,
     Evaluation,
     Integers,
@@ -125,20 +125,14 @@ class Closing:
     ----------
     t : Model
         With all rows; which coordinates are passive is not looked at.
-    slides : (C,) bool array
-        Coordinates in metres.
     names : list of str
         Of the coordinates.
     loops : list of str
-    size : float
-        Of the mechanism [m].
     """
 
-    def __init__(self, t: Model, slides: Array, names: list[str], loops: list[str], size: float,
-                 ) -> None:
+    def __init__(self, t: Model, names: list[str], loops: list[str]) -> None:
         self.t, self.names, self.loops = t, names, loops
-        self.columns = np.where(slides, size, 1.0)
-        self.rows = np.where(t.rows[:, KIND] == TRANSLATION, 1 / size, 1.0)
+        self.columns, self.rows = t.units[:, MEASURE], 1 / t.row_unit
 
     def derivatives(self, q: Array) -> tuple[Array, Array]:
         """Return rows (r,) and their derivatives by all coordinates (r, C), in units of size."""
@@ -247,8 +241,7 @@ def _rank(J: Array) -> int:
     return int(np.linalg.matrix_rank(J, tol=RANK * np.linalg.norm(J, 2))) if J.size else 0
 
 
-def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, units: Array,
-                                q: Array) -> Model:
+def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, q: Array) -> Model:
     """Return tables whose first rows determine passive coordinates.
 
     Coordinates that few rows depend on come first: fewer zeros then fill up in the elimination.
@@ -258,25 +251,17 @@ def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, uni
     t : Model
     rows, passive : int arrays
         As many independent rows as coordinates.
-    units : (C,) array
-        The mechanism's size for slides, 1 for turns.
     q : (C,) array
         Home, where the loops close.
     """
     _, J, _ = constraint_jacobian(t, q, passive)
     passive = passive[np.argsort(np.count_nonzero(J[rows], axis=0), kind='stable')]
     every = np.concatenate((rows, np.setdiff1d(np.arange(len(t.rows)), rows)))
-    places = t.places.copy()
-    places[:, PASSIVE_OF] = columns_of(passive, len(q))
+    places, count = t.places.copy(), len(passive)
+    places[t.drives] += 2 * count
+    places[passive] = np.arange(count)
     return t._replace(rows=t.rows[every], row_reals=t.row_reals[every], passive=passive,
-                      passive_unit=units[passive], places=places)
-
-
-def columns_of(coordinates: Integers, count: int) -> Integers:
-    """Return each coordinate's column among some coordinates, or -1."""
-    column = np.full(count, -1)
-    column[coordinates] = np.arange(len(coordinates))
-    return column
+                      places=places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,7 +396,7 @@ class _Builder:
     def __post_init__(self) -> None:
         self.parent, self.turns, self.coordinate = [0], [False], [-1]
         self.place, self.axis = [Frame()], [np.zeros(3)]
-        self.ratio, self.offset = [1.0], [0.0]
+        self.gain = [(1.0, 0.0)]  # ratio and offset
         self.coordinates: list[str] = []
         self.slides: list[bool] = []
         self.start: list[float] = []
@@ -488,8 +473,7 @@ class _Builder:
         self.axis.append(axis)
         self.turns.append(turns)
         self.coordinate.append(-1)
-        self.ratio.append(1.0)
-        self.offset.append(0.0)
+        self.gain.append((1.0, 0.0))
         return len(self.parent) - 1
 
     def _coordinate(self, row: int, name: str, start: float | None, lower: float = -np.inf,
@@ -526,7 +510,7 @@ class _Builder:
             raise ModelError('robot.urdf', joint.name,
                              f'mimic a joint that moves, not {leader.name}')
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
-        self.ratio[row], self.offset[row] = ratio, offset
+        self.gain[row] = ratio, offset
 
     def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> Model:
         """Return tables with all rows of the loops, and no passive coordinates yet."""
@@ -542,25 +526,23 @@ class _Builder:
                         signs.append(sign)
             starts.append(len(joints))
         driven = _integers([self.coordinate[self.rows[name]] for name in drives])
-        none, count = _integers([]), len(self.coordinates)
+        places, slides = np.full(len(self.coordinates), -1), np.array(self.slides, dtype=bool)
+        places[driven] = np.arange(len(driven))
         return Model(
             joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
-            passive=none, drives=driven,
-            places=np.column_stack((np.full(count, -1), columns_of(driven, count))),
+            passive=_integers([]), drives=driven, places=places,
             closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
                 placed, pairwise(starts), strict=True)]).reshape(-1, 4),
             rows=_integers([(k, row[0], *row[1]) for k, row in rows]).reshape(-1, 6),
             path=_integers([*zip(joints, signs, strict=True)]).reshape(-1, 2),
-            frames=np.array([[*frame.R, frame.p, axis] for frame, axis in zip(
-                self.place, self.axis, strict=True)]),
-            ratio=np.array(self.ratio), offset=np.array(self.offset),
-            stride=np.array([STRIDE_SLIDE * size if self.slides[c] else STRIDE_TURN
-                             for c in driven]),
+            frames=np.array([[*frame.R, frame.p, axis, (*gain, 0.0)] for frame, axis, gain in zip(
+                self.place, self.axis, self.gain, strict=True)]),
+            units=np.column_stack((np.where(slides, STRIDE_SLIDE * size, STRIDE_TURN),
+                                   np.where(slides, size, 1.0))),
             closure_frames=np.array([[*a.R, a.p, *b.R, b.p] for _, a, _, b in placed],
                                     dtype=float).reshape(-1, OF_CLOSURE, 3),
-            row_reals=_vectors((*row[2], size if row[0] == TRANSLATION else 1.0)
-                               for _, row in rows),
-            passive_unit=np.zeros(0))
+            row_reals=np.array([(*row[2], size if row[0] == TRANSLATION else 1.0)
+                                for _, row in rows], dtype=float).reshape(-1, 3))
 
     def _on(self, loop: Loop, side: str) -> tuple[int, Frame]:
         link, frame = ((loop.a, loop.frame_a) if side == 'a' else (loop.b, loop.frame_b))
@@ -572,10 +554,6 @@ class _Builder:
 
 def _integers(values: Sequence[Any]) -> Integers:
     return np.array(values, dtype=np.int64)
-
-
-def _vectors(rows: Iterable[Any]) -> Array:
-    return np.array([*rows], dtype=float).reshape(-1, 3)
 
 
 def build_structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
@@ -623,8 +601,7 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     none = _integers([])
     size = _size(build.tables(loops, drives, 1.0), start)
     t = build.tables(loops, drives, size)
-    closing = Closing(t, np.array(build.slides), build.coordinates,
-                      [loop.name for loop in loops], size)
+    closing = Closing(t, build.coordinates, [loop.name for loop in loops])
     named = [name for name in home if name in build.rows]
     free = np.array([name not in named or name not in drives for name in build.coordinates])
     q = _home(closing, start, free) if loops else start
@@ -636,9 +613,8 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
-    units = np.where(build.slides, size, 1.0)
     return replace(structure, mobility=mobility, tables=with_determined_coordinates(
-        t, mobility.rows, mobility.passive, units, q))
+        t, mobility.rows, mobility.passive, q))
 
 
 def _home(closing: Closing, start: Array, free: Array) -> Array:

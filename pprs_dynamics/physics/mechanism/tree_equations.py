@@ -32,6 +32,7 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.vectors import (
     Vector,
     dot,
+    elements,
     minus,
     plus,
     product,
@@ -45,24 +46,25 @@ Integers = np.typing.NDArray[np.int_]
 TRANSLATION, ANGLE = 0, 1  # kinds of rows
 # Rows of tables of vectors: of a joint's frame, a closure's frames, a link's motion, a closure's
 # motion, and forces; a frame's orientation is three rows.
-PLACE_R, PLACE_P, AXIS, OF_FRAME = 0, 3, 4, 5
+PLACE_R, PLACE_P, AXIS, GAIN, OF_FRAME = 0, 3, 4, 5, 6
 A_R, A_P, B_R, B_P, OF_CLOSURE = 0, 3, 4, 7, 8
 R, P, Z, W, U, WD, UD, OF_LINK = 0, 3, 4, 5, 6, 7, 8, 9
 FORCE, MOMENT, OF_FORCES = 0, 1, 2
 # Columns of tables of whole numbers.
 PARENT, TURNS, COORDINATE = 0, 1, 2
-PASSIVE_OF, DRIVE_OF = 0, 1
 LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
 UNIT = 2  # column of `row_reals`
+STRIDE, MEASURE = 0, 1  # columns of `units`
+Q, V, A = 0, 1, 2  # rows of `Data.motion`
 # Of `Data.solution`.
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 # Rows of the parameters of drives, and of the efforts that follow from them.
 ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
 TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
 # Names of the numbers of rows of the tables, and of the columns of some.
-SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'solved')
+SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'width')
 FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
 N = TypeVar('N', bound=tuple[Any, ...])
 CLOSED = 1e-7  # [m, rad] of a row and of the last Newton step, after which the error is its square
@@ -92,12 +94,16 @@ PARTS: dict[str, tuple[str, Any]] = {
     'parent': ('joints', np.s_[..., PARENT]), 'turns': ('joints', np.s_[..., TURNS]),
     'coordinate': ('joints', np.s_[..., COORDINATE]), 'loop_a': ('closures', np.s_[..., LOOP_A]),
     'loop_b': ('closures', np.s_[..., LOOP_B]), 'row_unit': ('row_reals', np.s_[..., UNIT]),
-    # Of a joint: orientation and origin in its parent, and axis.
+    # Of a joint: orientation and origin in its parent, axis, ratio and offset to its coordinate.
     'place_R': ('frames', _matrix(PLACE_R)), 'place_p': ('frames', _vector(PLACE_P)),
-    'axis': ('frames', _vector(AXIS)),
+    'axis': ('frames', _vector(AXIS)), 'ratio': ('frames', np.s_[..., GAIN, 0]),
+    'offset': ('frames', np.s_[..., GAIN, 1]),
     # Of a closure: frames A and B in their links.
     'a_R': ('closure_frames', _matrix(A_R)), 'a_p': ('closure_frames', _vector(A_P)),
     'b_R': ('closure_frames', _matrix(B_R)), 'b_p': ('closure_frames', _vector(B_P)),
+    # Of all coordinates: position, velocity and acceleration.
+    'q': ('motion', np.s_[..., Q, :]), 'v': ('motion', np.s_[..., V, :]),
+    'a': ('motion', np.s_[..., A, :]),
     # Of a joint's link: orientation, origin, axis, angular and linear velocity and acceleration.
     'R': ('links', _matrix(R)), 'p': ('links', _vector(P)), 'z': ('links', _vector(Z)),
     'w': ('links', _vector(W)), 'u': ('links', _vector(U)), 'wd': ('links', _vector(WD)),
@@ -133,15 +139,14 @@ class Model(NamedTuple):
     joints : (J + 1, 3) int array
         Parent, whether it turns, coordinate.
     frames : (J + 1, OF_FRAME, 3) array
-        Frame at position 0 in the parent's, and axis in the joint's.
-    ratio, offset : (J + 1,) arrays
-        A joint's position is ratio q[coordinate] + offset.
+        Frame at position 0 in the parent's, axis in the joint's, and ratio and offset: a joint's
+        position is ratio q[coordinate] + offset.
     passive, drives : int arrays
         Coordinates that closures determine, and those that are given.
-    places : (C, 2) int array
-        Place of each coordinate among them, or -1.
-    stride : (D,) array
-        By which drives move between closings.
+    places : (C,) int array
+        Column of each coordinate in `Data.system`, or -1.
+    units : (C, 2) array
+        By which it moves between closings as a drive, and the unit in which conditioning is judged.
     closures : (L, 4) int array
         Joints whose links it connects; where its path begins and ends.
     closure_frames : (L, OF_CLOSURE, 3) array
@@ -151,10 +156,7 @@ class Model(NamedTuple):
         axis of B, and a second pair. The first rows, as many as passive coordinates, determine
         these; the others follow from them at home.
     row_reals : (r, 3) array
-        Weights of the two pairs; the mechanism's size for lengths, 1 for angles: the unit in which
-        conditioning is judged.
-    passive_unit : (passive,) array
-        The same for coordinates.
+        Weights of the two pairs; the mechanism's size for lengths, 1 for angles: the unit.
     path : (K, 2) int array
         Joints between closures' two links, and 1 on the side of B, -1 on that of A.
     """
@@ -162,17 +164,14 @@ class Model(NamedTuple):
     joints: Annotated[Integers, 'joints', 3]
     passive: Annotated[Integers, 'passive']
     drives: Annotated[Integers, 'drives']
-    places: Annotated[Integers, 'coordinates', 2]
+    places: Annotated[Integers, 'coordinates']
     closures: Annotated[Integers, 'loops', 4]
     rows: Annotated[Integers, 'rows', 6]
     path: Annotated[Integers, 'path', 2]
     frames: Annotated[Array, 'joints', OF_FRAME, 3]
-    ratio: Annotated[Array, 'joints']
-    offset: Annotated[Array, 'joints']
-    stride: Annotated[Array, 'drives']
+    units: Annotated[Array, 'coordinates', 2]
     closure_frames: Annotated[Array, 'loops', OF_CLOSURE, 3]
     row_reals: Annotated[Array, 'rows', 3]
-    passive_unit: Annotated[Array, 'passive']
 
     def __getattr__(self, name: str) -> Any:
         return _read(self, name)
@@ -183,8 +182,8 @@ class Data(NamedTuple):
 
     Parameters
     ----------
-    q, v, a : (C,) arrays
-        Of all coordinates.
+    motion : (3, C) array
+        Position q, velocity v and acceleration a of all coordinates.
     links : (J + 1, OF_LINK, 3) array
         Orientation, origin, axis, angular and linear velocity and acceleration of each joint's
         link, at its origin.
@@ -192,26 +191,19 @@ class Data(NamedTuple):
         Frames of the closures.
     drive_to_joint : (C, D) array
         T: rates of all coordinates per rate of each drive.
-    inverse : (passive, passive + D) array
-        J_p^-1, and J_p^-1 J_a.
+    system : (passive, 2 passive + D + 1) array
+        J_p during its elimination, J_p^-1, J_p^-1 J_a, and a column for rows.
     solution : (4,) array
         Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
         Newton in the last stride.
-    J, by_drives, residuals : arrays
-        Scratch: J_p during its elimination, J_a, and rows.
     """
 
-    q: Annotated[Any, 'coordinates']
-    v: Annotated[Any, 'coordinates']
-    a: Annotated[Any, 'coordinates']
+    motion: Annotated[Any, 3, 'coordinates']
     links: Annotated[Any, 'joints', OF_LINK, 3]
     loops: Annotated[Any, 'loops', OF_CLOSURE, 3]
     drive_to_joint: Annotated[Any, 'coordinates', 'drives']
-    inverse: Annotated[Any, 'passive', 'solved']
+    system: Annotated[Any, 'passive', 'width']
     solution: Annotated[Any, 4]
-    J: Annotated[Any, 'passive', 'passive']
-    by_drives: Annotated[Any, 'passive', 'drives']
-    residuals: Annotated[Any, 'passive', 1]
 
     def __getattr__(self, name: str) -> Any:
         return _read(self, name)
@@ -226,8 +218,8 @@ class Loads(NamedTuple):
         What each joint transmits to its link: force, and moment about its origin.
     loops : (L, OF_FORCES, 3) array
         What the link of A does to that of B in each closure: force and moment.
-    tau, tau_friction : (C,) arrays
-        Efforts of the tree's coordinates: of the bodies, and against friction of joints.
+    tau : (C,) array
+        Efforts of the tree's coordinates: of the bodies, then against friction of joints.
     efforts : (D,) array
         Of the drives.
     """
@@ -235,7 +227,6 @@ class Loads(NamedTuple):
     links: Annotated[Any, 'joints', OF_FORCES, 3]
     loops: Annotated[Any, 'loops', OF_FORCES, 3]
     tau: Annotated[Any, 'coordinates']
-    tau_friction: Annotated[Any, 'coordinates']
     efforts: Annotated[Any, 'drives']
 
     def __getattr__(self, name: str) -> Any:
@@ -272,7 +263,7 @@ def _sizes_of(t: Model) -> Integers:
     """Return the numbers that `SIZES` names, of tables."""
     found = {name: rows for table, shape in _shapes(Model).items()
              for name, rows in zip(shape, getattr(t, table).shape, strict=True)}
-    found['solved'] = len(t.passive) + len(t.drives)
+    found['width'] = 2 * len(t.passive) + len(t.drives) + 1
     return np.array([found[name] for name in SIZES], dtype=np.int64)
 
 
@@ -332,14 +323,6 @@ def _reader(kind: type) -> Callable[..., Any]:
     exec('\n'.join(lines), namespace)
     read: Callable[..., Any] = namespace['read']
     return read
-
-
-def elements(named: Any) -> Any:
-    """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
-
-    Compiled code takes the arrays unchanged.
-    """
-    return type(named)(*(array.data for array in named))
 
 
 def _is_real(name: str) -> bool:
@@ -403,46 +386,41 @@ def larger(x: Any, y: Any) -> Any:
     return y if x < y else x
 
 
-def solve(A: Any, B: Any) -> Any:
-    """Solve A X = B in place of B, and return the determinant of A, which is destroyed.
+def solve(table: Any, size: int, first: int, last: int) -> Any:
+    """Solve A X = B, columns first to last, in place of B; return the determinant of A.
 
-    Elimination with partial pivoting, which passes over the zeros: a leg's rows know its own joints
-    and those of the platform.
-
-    Parameters
-    ----------
-    A : (n, n) array
-    B : (n, K) array
+    A is in the first columns, which are destroyed. Elimination with partial pivoting, which passes
+    over the zeros: a leg's rows know its own joints and those of the platform.
     """
-    size, columns, determinant = len(A), B.shape[1], 1.0
+    determinant = 1.0
     for k in range(size):
         pivot = k
         for r in range(k + 1, size):
-            if abs(A[r, k]) > abs(A[pivot, k]):
+            if abs(table[r, k]) > abs(table[pivot, k]):
                 pivot = r
         if pivot != k:
             determinant = -determinant
             for c in range(k, size):
-                A[k, c], A[pivot, c] = A[pivot, c], A[k, c]
-            for c in range(columns):
-                B[k, c], B[pivot, c] = B[pivot, c], B[k, c]
-        determinant *= A[k, k]
-        scale = 1.0 / A[k, k]
+                table[k, c], table[pivot, c] = table[pivot, c], table[k, c]
+            for c in range(first, last):
+                table[k, c], table[pivot, c] = table[pivot, c], table[k, c]
+        determinant *= table[k, k]
+        scale = 1.0 / table[k, k]
         for r in range(k + 1, size):
-            if A[r, k] != 0.0:
-                share = A[r, k] * scale
+            if table[r, k] != 0.0:
+                share = table[r, k] * scale
                 for c in range(k + 1, size):
-                    A[r, c] -= share * A[k, c]
-                for c in range(columns):
-                    B[r, c] -= share * B[k, c]
+                    table[r, c] -= share * table[k, c]
+                for c in range(first, last):
+                    table[r, c] -= share * table[k, c]
     for k in range(size - 1, -1, -1):
         for n in range(k + 1, size):
-            if A[k, n] != 0.0:
-                for c in range(columns):
-                    B[k, c] -= A[k, n] * B[n, c]
-        scale = 1.0 / A[k, k]
-        for c in range(columns):
-            B[k, c] *= scale
+            if table[k, n] != 0.0:
+                for c in range(first, last):
+                    table[k, c] -= table[k, n] * table[n, c]
+        scale = 1.0 / table[k, k]
+        for c in range(first, last):
+            table[k, c] *= scale
     return determinant
 
 
@@ -455,7 +433,7 @@ def update_frame_placements(t: Model, m: Data) -> None:
         links[0, P, r] = 0.0
     for j in range(1, len(t.joints)):
         i = t.joints[j, PARENT]
-        s = t.ratio[j] * m.q[t.joints[j, COORDINATE]] + t.offset[j]
+        s = frames[j, GAIN, 0] * m.motion[Q, t.joints[j, COORDINATE]] + frames[j, GAIN, 1]
         axis = vector(frames, j, AXIS)
         origin = plus(vector(links, i, P),
                       turned(links, i, R, vector(frames, j, PLACE_P)))
@@ -464,12 +442,13 @@ def update_frame_placements(t: Model, m: Data) -> None:
             # Columns of the rotation about the axis, each taken to the base.
             C, S = cos(s), sin(s)
             e = times(1.0 - C, axis)
-            x_of = Vector(C + e.x * axis.x, e.y * axis.x + S * axis.z, e.z * axis.x - S * axis.y)
-            y_of = Vector(e.x * axis.y - S * axis.z, C + e.y * axis.y, e.z * axis.y + S * axis.x)
-            z_of = Vector(e.x * axis.z + S * axis.y, e.y * axis.z - S * axis.x, C + e.z * axis.z)
-            put_column(links, j, R, 0, turned(links, i, R, turned(frames, j, PLACE_R, x_of)))
-            put_column(links, j, R, 1, turned(links, i, R, turned(frames, j, PLACE_R, y_of)))
-            put_column(links, j, R, 2, turned(links, i, R, turned(frames, j, PLACE_R, z_of)))
+            columns = (
+                Vector(C + e.x * axis.x, e.y * axis.x + S * axis.z, e.z * axis.x - S * axis.y),
+                Vector(e.x * axis.y - S * axis.z, C + e.y * axis.y, e.z * axis.y + S * axis.x),
+                Vector(e.x * axis.z + S * axis.y, e.y * axis.z - S * axis.x, C + e.z * axis.z))
+            for c in range(3):
+                put_column(links, j, R, c,
+                           turned(links, i, R, turned(frames, j, PLACE_R, columns[c])))
         else:
             origin = plus(origin, times(s, z))
             for c in range(3):
@@ -507,22 +486,20 @@ def row_axis(t: Model, m: Data, r: int) -> Vector:
         times(t.row_reals[r, 1], product(column(loops, k, B_R, h), column(loops, k, A_R, g))))
 
 
-def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) -> None:
-    """Fill in the derivatives of the first rows by passive coordinates, and by drives.
+def jacobian(t: Model, m: Data, places: Any, table: Any) -> None:
+    """Fill in the derivatives of the first rows, as many as the table has.
 
     Parameters
     ----------
     t, m : Model, Data
-    places : (C, 2) int array
-        Column of each coordinate in either, or -1.
-    of_passive (r, P), of_drives (r, D) : arrays
-        As many rows as are filled in.
+    places : (C,) int array
+        Column of each coordinate in the table, or -1.
+    table : (r, K) array
+        Columns of no coordinate become zero.
     """
-    for r in range(len(of_passive)):
-        for c in range(of_passive.shape[1]):
-            of_passive[r, c] = 0.0
-        for d in range(of_drives.shape[1]):
-            of_drives[r, d] = 0.0
+    for r in range(len(table)):
+        for c in range(table.shape[1]):
+            table[r, c] = 0.0
         k, of_points = t.rows[r, LOOP], t.rows[r, KIND] == TRANSLATION
         e = row_axis(t, m, r)
         # Per rate of a joint on the side of B: e' (z x (p_B - p)), e' z, or nothing.
@@ -535,12 +512,9 @@ def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) ->
             z = vector(m.links, j, Z)
             along = dot(z, minus(moment, product(vector(m.links, j, P), e))) if (
                 of_points and turns) else dot(z, e)
-            x = t.path[n, SIGN] * t.ratio[j] * along
-            c, d = places[t.joints[j, COORDINATE], 0], places[t.joints[j, COORDINATE], 1]
+            c = places[t.joints[j, COORDINATE]]
             if c >= 0:
-                of_passive[r, c] += x
-            if d >= 0:
-                of_drives[r, d] += x
+                table[r, c] += t.path[n, SIGN] * t.frames[j, GAIN, 0] * along
 
 
 def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
@@ -554,13 +528,15 @@ def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     bool
         False where the loops do not close on the way.
     """
-    count = len(t.passive)
-    for c in range(len(m.q)):
-        m.q[c] = start[c]
+    count, motion, system = len(t.passive), m.motion, m.system
+    last = system.shape[1] - 1
+    for c in range(len(start)):
+        motion[Q, c] = start[c]
     m.solution[OPEN] = m.solution[STEPS] = need = size = 0.0
     for d in range(len(t.drives)):
-        m.q[t.drives[d]] = goal[d]
-        need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
+        c = t.drives[d]
+        motion[Q, c] = goal[d]
+        need = larger(need, abs(goal[d] - start[c]) / t.units[c, STRIDE])
     if count and not need < MOST_STRIDES:
         m.solution[OPEN] = need + 1.0
         return False
@@ -568,25 +544,25 @@ def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     for k in range(1, strides + 1):
         for d in range(len(t.drives)):
             c = t.drives[d]
-            m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
+            motion[Q, c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
         is_closed = not count
         for n in range(1 + MOST_STEPS):
             update_frame_placements(t, m)
-            jacobian(t, m, t.places, m.J, m.by_drives)
+            jacobian(t, m, t.places, system)
             if is_closed or n == MOST_STEPS:
                 break
             m.solution[STEPS] = 1.0 + n
             size = 0.0
             for r in range(count):
-                m.residuals[r, 0] = residual(t, m, r)
-                size = larger(size, abs(m.residuals[r, 0]))
-            solve(m.J, m.residuals)
+                system[r, last] = residual(t, m, r)
+                size = larger(size, abs(system[r, last]))
+            solve(system, count, last, last + 1)
             step = 0.0
             for r in range(count):
-                step = larger(step, abs(m.residuals[r, 0]))
+                step = larger(step, abs(system[r, last]))
             share = LONGEST_STEP / larger(step, LONGEST_STEP)
             for r in range(count):
-                m.q[t.passive[r]] -= share * m.residuals[r, 0]
+                motion[Q, t.passive[r]] -= share * system[r, last]
             is_closed = larger(step, size) < CLOSED
         if not size < CLOSED:
             break
@@ -598,7 +574,7 @@ def is_near(t: Model, start: Any, goal: Any) -> bool:
     """Return whether all drives are within a stride of a goal (D,) at coordinates `start`."""
     near = True
     for d in range(len(t.drives)):
-        near = near and abs(goal[d] - start[t.drives[d]]) < t.stride[d]
+        near = near and abs(goal[d] - start[t.drives[d]]) < t.units[t.drives[d], STRIDE]
     return near
 
 
@@ -632,15 +608,14 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
     v, a : (D,) arrays
     """
     count, drives = len(t.passive), len(t.drives)
-    T, inverse, by_drives, passive = m.drive_to_joint, m.inverse, m.by_drives, t.passive
-    for c in range(len(m.v)):
-        m.v[c] = 0.0
-        m.a[c] = 0.0
+    T, motion, system, passive = m.drive_to_joint, m.motion, m.system, t.passive
+    last = system.shape[1] - 1
+    for c in range(len(T)):
+        motion[V, c] = motion[A, c] = 0.0
         for d in range(drives):
             T[c, d] = 0.0
     for d in range(drives):
-        m.v[t.drives[d]] = v[d]
-        m.a[t.drives[d]] = a[d]
+        motion[V, t.drives[d]], motion[A, t.drives[d]] = v[d], a[d]
         T[t.drives[d], d] = 1.0
     m.solution[DETERMINANT] = m.solution[CONDITION] = 0.0
     if count:
@@ -648,38 +623,36 @@ def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
         for r in range(count):
             x = 0.0
             for c in range(count):
-                x = x + square(m.J[r, c] * t.passive_unit[c])
-                inverse[r, c] = 1.0 if r == c else 0.0
-            for d in range(drives):
-                inverse[r, count + d] = by_drives[r, d]
+                x = x + square(system[r, c] * t.units[passive[c], MEASURE])
+            system[r, count + r] = 1.0
             there = there + x / square(t.row_reals[r, UNIT])
-        m.solution[DETERMINANT] = solve(m.J, inverse)
+        m.solution[DETERMINANT] = solve(system, count, count, last)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
         back = 0.0
         for c in range(count):
             x = 0.0
             for r in range(count):
-                x = x + square(inverse[c, r] * t.row_reals[r, UNIT])
-            back = back + x / square(t.passive_unit[c])
+                x = x + square(system[c, count + r] * t.row_reals[r, UNIT])
+            back = back + x / square(t.units[passive[c], MEASURE])
             for d in range(drives):
-                T[passive[c], d] = -inverse[c, count + d]
+                T[passive[c], d] = -system[c, 2 * count + d]
         m.solution[CONDITION] = sqrt(there * back)
         for c in range(count):
             x = 0.0
             for d in range(drives):
                 x = x + T[passive[c], d] * v[d]
-            m.v[passive[c]] = x
+            motion[V, passive[c]] = x
     velocities(t, m)
     for again in range(2 if count else 1):
         # First without those of passive coordinates: they undo what the rows accelerate then.
         if again:
             for r in range(count):
-                m.residuals[r, 0] = row_acceleration(t, m, r)
+                system[r, last] = row_acceleration(t, m, r)
             for c in range(count):
                 x = 0.0
                 for r in range(count):
-                    x = x + inverse[c, r] * m.residuals[r, 0]
-                m.a[passive[c]] = -x
+                    x = x + system[c, count + r] * system[r, last]
+                motion[A, passive[c]] = -x
         accelerations(t, m)
 
 
@@ -697,17 +670,17 @@ def predict(t: Model, m: Data, goal: Any, start: Any) -> None:
     start : (C,) array
         Closed coordinates of the sample; overwritten by the extrapolation.
     """
-    T, speed, along = m.drive_to_joint, 1e-300, 0.0
+    T, motion, speed, along = m.drive_to_joint, m.motion, 1e-300, 0.0
     for d in range(len(t.drives)):
-        v = m.v[t.drives[d]]
+        v = motion[V, t.drives[d]]
         speed += v * v
         along += v * (goal[d] - start[t.drives[d]])
     half = 0.5 * square(along / speed)
     for p in range(len(t.passive)):
         c = t.passive[p]
-        drift, move = m.a[c], 0.0
+        drift, move = motion[A, c], 0.0
         for d in range(len(t.drives)):
-            drift -= T[c, d] * m.a[t.drives[d]]
+            drift -= T[c, d] * motion[A, t.drives[d]]
             move += T[c, d] * (goal[d] - start[t.drives[d]])
         start[c] += move + half * drift
     for d in range(len(t.drives)):
@@ -724,7 +697,8 @@ def velocities(t: Model, m: Data) -> None:
         w = vector(links, i, W)
         arm = minus(vector(links, j, P), vector(links, i, P))
         u = plus(vector(links, i, U), product(w, arm))
-        own = times(t.ratio[j] * m.v[t.joints[j, COORDINATE]], vector(links, j, Z))
+        own = times(t.frames[j, GAIN, 0] * m.motion[V, t.joints[j, COORDINATE]],
+                    vector(links, j, Z))
         if t.joints[j, TURNS]:
             w = plus(w, own)
         else:
@@ -740,12 +714,12 @@ def accelerations(t: Model, m: Data) -> None:
         links[0, WD, c] = links[0, UD, c] = 0.0
     for j in range(1, len(t.joints)):
         i = t.joints[j, PARENT]
-        k, z = t.joints[j, COORDINATE], vector(links, j, Z)
+        k, ratio, z = t.joints[j, COORDINATE], t.frames[j, GAIN, 0], vector(links, j, Z)
         w, wd = vector(links, i, W), vector(links, i, WD)
         arm = minus(vector(links, j, P), vector(links, i, P))
         ud = plus(plus(vector(links, i, UD), product(wd, arm)), product(w, product(w, arm)))
-        own = times(t.ratio[j] * m.a[k], z)
-        turning = product(w, times(t.ratio[j] * m.v[k], z))
+        own = times(ratio * m.motion[A, k], z)
+        turning = product(w, times(ratio * m.motion[V, k], z))
         if t.joints[j, TURNS]:
             wd = plus(plus(wd, own), turning)
         else:
@@ -771,24 +745,22 @@ def _turning(links: Any, j: int, direction: Vector) -> Any:
 
 def row_acceleration(t: Model, m: Data, r: int) -> Any:
     """Return the second derivative of a row by time."""
-    k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    k, loops, total = t.rows[r, LOOP], m.loops, 0.0
     if t.rows[r, KIND] == TRANSLATION:
-        e, p_a, p_b = column(loops, k, A_R, i), vector(loops, k, A_P), vector(loops, k, B_P)
+        e = column(loops, k, A_R, t.rows[r, AXES])
+        p_a, p_b = vector(loops, k, A_P), vector(loops, k, B_P)
         de, dde = _turning(m.links, t.closures[k, LOOP_A], e)
         v_a, a_a = _point(m.links, t.closures[k, LOOP_A], p_a)
         v_b, a_b = _point(m.links, t.closures[k, LOOP_B], p_b)
         return (dot(e, minus(a_b, a_a)) + 2.0 * dot(de, minus(v_b, v_a))
                 + dot(dde, minus(p_b, p_a)))
-    total = t.row_reals[r, 0] * _angle_acceleration(t, m, k, i, t.rows[r, AXES + 1])
-    return total + t.row_reals[r, 1] * _angle_acceleration(
-        t, m, k, t.rows[r, AXES + 2], t.rows[r, AXES + 3])
-
-
-def _angle_acceleration(t: Model, m: Data, k: int, i: int, j: int) -> Any:
-    a, b = column(m.loops, k, A_R, i), column(m.loops, k, B_R, j)
-    da, dda = _turning(m.links, t.closures[k, LOOP_A], a)
-    db, ddb = _turning(m.links, t.closures[k, LOOP_B], b)
-    return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
+    for pair in range(2):
+        a = column(loops, k, A_R, t.rows[r, AXES + 2 * pair])
+        b = column(loops, k, B_R, t.rows[r, AXES + 2 * pair + 1])
+        da, dda = _turning(m.links, t.closures[k, LOOP_A], a)
+        db, ddb = _turning(m.links, t.closures[k, LOOP_B], b)
+        total = total + t.row_reals[r, pair] * (dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db))
+    return total
 
 
 def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -> None:
@@ -808,17 +780,17 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
         spin = plus(_inertia_times(links, j, inertial, wd),
                     product(w, _inertia_times(links, j, inertial, w)))
         increase(o.links, j, MOMENT, plus(spin, product(h, a)))
-    for c in range(len(m.q)):
+    for c in range(len(o.tau)):
         o.tau[c] = 0.0
     for j in range(len(t.joints) - 1, 0, -1):
         i = t.joints[j, PARENT]
         f, n = vector(o.links, j, FORCE), vector(o.links, j, MOMENT)
         along = dot(vector(links, j, Z), n if t.joints[j, TURNS] else f)
-        o.tau[t.joints[j, COORDINATE]] += t.ratio[j] * along
+        o.tau[t.joints[j, COORDINATE]] += t.frames[j, GAIN, 0] * along
         arm = minus(vector(links, j, P), vector(links, i, P))
         increase(o.links, i, FORCE, f)
         increase(o.links, i, MOMENT, plus(n, product(arm, f)))
-    project_to_actuators(t, m, o.tau, o.efforts)
+    project_to_actuators(t.passive, t.drives, m.drive_to_joint, o)
 
 
 def _is_zero(inertial: Any, j: int) -> bool:
@@ -836,26 +808,25 @@ def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
         xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
 
 
-def project_to_actuators(t: Model, m: Data, of_tree: Any, efforts: Any) -> None:
+def project_to_actuators(passive: Any, driven: Any, T: Any, o: Loads) -> None:
     """Fill in the drives' efforts T' tau for efforts of the tree's coordinates."""
-    T, passive, driven = m.drive_to_joint, t.passive, t.drives
     for d in range(len(driven)):
-        x = of_tree[driven[d]]
+        x = o.tau[driven[d]]
         for c in range(len(passive)):
-            x = x + T[passive[c], d] * of_tree[passive[c]]
-        efforts[d] = x
+            x = x + T[passive[c], d] * o.tau[passive[c]]
+        o.efforts[d] = x
 
 
 def constraint_forces(t: Model, m: Data, o: Loads) -> None:
     """Fill in what the closures transmit, and with them the joints."""
-    count, inverse = len(t.passive), m.inverse
+    count, system = len(t.passive), m.system
     for k in range(len(o.loops)):
         for c in range(3):
             o.loops[k, FORCE, c] = o.loops[k, MOMENT, c] = 0.0
     for r in range(count):
         x = 0.0
         for c in range(count):
-            x = x + inverse[c, r] * o.tau[t.passive[c]]
+            x = x + system[c, count + r] * o.tau[t.passive[c]]
         kind = FORCE if t.rows[r, KIND] == TRANSLATION else MOMENT
         increase(o.loops, t.rows[r, LOOP], kind, times(x, row_axis(t, m, r)))
     for k in range(len(t.closures)):
@@ -892,35 +863,41 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
                              + efforts[JOINT_EFFORT, d])
 
 
-def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction) -> None:
+def joint_friction(t: Model, m: Data, o: Loads, rubbing: Any) -> None:
     """Fill in the drives' efforts against friction of passive joints, with their loads.
 
     The moment in a closure acts on both of its links: it is felt in the joints between them.
+
+    Parameters
+    ----------
+    t, m, o : Model, Data, Loads
+    rubbing : (6, F) array
+        A `JointFriction`.
     """
-    of_tree, links = o.tau_friction, m.links
-    for c in range(len(m.q)):
+    of_tree, links = o.tau, m.links
+    for c in range(len(of_tree)):
         of_tree[c] = 0.0
-    for k in range(len(s.joint)):
-        j = int(s.joint[k])
+    for k in range(rubbing.shape[1]):
+        j, g, viscous, torque = int(rubbing[0, k]), int(rubbing[1, k]), rubbing[2, k], rubbing[3, k]
+        lever, width = rubbing[4, k], rubbing[5, k]
         if j >= 0:
-            c = t.joints[j, COORDINATE]
-            rate = t.ratio[j] * m.v[c]
+            c, ratio = t.joints[j, COORDINATE], t.frames[j, GAIN, 0]
+            rate = ratio * m.motion[V, c]
             across = product(vector(o.links, j, FORCE), vector(links, j, Z))
-            dry = s.torque[k] + s.lever[k] * length(across)
-            of_tree[c] += t.ratio[j] * (s.viscous[k] * rate + dry * tanh(rate / s.width[k]))
+            dry = torque + lever * length(across)
+            of_tree[c] += ratio * (viscous * rate + dry * tanh(rate / width))
         else:
-            g = int(s.loop[k])
             relative = minus(vector(links, t.closures[g, LOOP_B], W),
                              vector(links, t.closures[g, LOOP_A], W))
-            dry = s.torque[k] + s.lever[k] * length(vector(o.loops, g, FORCE))
-            moment = times(s.viscous[k] + dry * sign_over_speed(length(relative), s.width[k]),
-                           relative)
+            dry = torque + lever * length(vector(o.loops, g, FORCE))
+            moment = times(viscous + dry * sign_over_speed(length(relative), width), relative)
             for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
                 i = t.path[n, JOINT]
                 if t.joints[i, TURNS]:
-                    of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
+                    ratio = t.frames[i, GAIN, 0]
+                    of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * ratio * dot(
                         vector(links, i, Z), moment)
-    project_to_actuators(t, m, of_tree, o.efforts)
+    project_to_actuators(t.passive, t.drives, m.drive_to_joint, o)
 
 
 def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
@@ -932,8 +909,6 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
     Return the first sample that fails, or -1.
     """
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
-                                      rubbing[5]))
     for s in range(len(closed)):
         at = s if stages & KEPT else 0
         m = elements(read_motion(sizes, motions[at], reals))
@@ -956,7 +931,7 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
             if not is_closed:
                 return s
             for c in range(len(home)):
-                closed[s, c] = start[c] = m.q[c]
+                closed[s, c] = start[c] = m.motion[Q, c]
             if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
                 predict(t, m, given[0, s + 1], start)
             if not (stages & KEPT or is_regular):
@@ -972,7 +947,7 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
                 own = efforts[:, s]
                 for d in range(given.shape[2]):
                     own[TRANSMITTED, d] = o.efforts[d]
-                joint_friction(t, m, o, friction)
+                joint_friction(t, m, o, rubbing)
                 for d in range(given.shape[2]):
                     own[JOINT_EFFORT, d] = o.efforts[d]
                 actuator_efforts(actuators, given[1, s], given[2, s], own)
@@ -983,12 +958,10 @@ def oppose_friction(sizes: Any, integers: Any, reals: Any, motions: Any, links: 
          rubbing: Any, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
     t = elements(read_tables(sizes, integers, reals))
-    friction = elements(JointFriction(rubbing[0], rubbing[1], rubbing[2], rubbing[3], rubbing[4],
-                                      rubbing[5]))
     for s in range(len(efforts)):
         m = elements(read_motion(sizes, motions[s], reals))
-        o = Loads(links[s], loops[s], of_tree, of_tree, efforts[s])
-        joint_friction(t, m, o, friction)
+        o = Loads(links[s], loops[s], of_tree, efforts[s])
+        joint_friction(t, m, o, rubbing)
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
@@ -997,12 +970,12 @@ def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, A
     m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
     m.q[0] = q
     sample = type(m)(*(array[0].data for array in m))
-    places = np.full((len(q), 2), -1)
-    places[columns, 0] = np.arange(len(columns))
+    places = np.full(len(q), -1)
+    places[columns] = np.arange(len(columns))
     update_frame_placements(t, sample)
     residuals = np.array([residual(t, sample, r) for r in range(len(t.rows))])
     J = np.zeros((len(t.rows), len(columns)))
-    jacobian(t, sample, places, J, np.empty((len(J), 0)))
+    jacobian(t, sample, places, J)
     return residuals, J, m
 
 

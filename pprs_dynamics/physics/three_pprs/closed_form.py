@@ -27,13 +27,13 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     JOINT_EFFORT,
     RIGID,
     TOTAL,
-    elements,
 )
 from pprs_dynamics.physics.mechanism.vectors import (
     MotionSample,
     Vector,
     combine,
     dot,
+    elements,
     minus,
     motion_sample,
     plus,
