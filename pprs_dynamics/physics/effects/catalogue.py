@@ -139,8 +139,10 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
         try:
             effect = _load(point, effects)
         except (_UnusableEffectError, EffectError) as error:
-            warnings.warn(displayed(f'{_origin(point)} is left out: {error}'), RuntimeWarning,
-                          stacklevel=2)
+            package = f' of the package {point.dist.name}' if point.dist else ''
+            warnings.warn(displayed(
+                f'the effect {point.name} = {point.value}{package} is left out: {error}'),
+                RuntimeWarning, stacklevel=2)
         else:
             effects[effect.name] = effect
     return effects
@@ -178,8 +180,3 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
     if issubclass(effect, DriveEffect):
         check_columns(effect)
     return effect
-
-
-def _origin(point: EntryPoint) -> str:
-    package = f' of the package {point.dist.name}' if point.dist else ''
-    return f'the effect {point.name} = {point.value}{package}'

@@ -16,6 +16,7 @@ IEEE Transactions on Robotics and Automation 6 (1990).
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -24,6 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure
 
@@ -63,7 +65,7 @@ def _alike_bodies(structure: Structure, bodies: tuple[int, ...],
     count = len(bodies)
     if count < 2:
         return tuple((k,) for k in range(count))
-    columns = _bare(structure, bodies, gravity).regressor(*_states(structure)).reshape(
+    columns = _moving(structure).regressor(np.array(bodies), np.array(gravity)).reshape(
         -1, count, PARAMETERS)
     spaces = [_space(columns[:, k]) for k in range(count)]
     return _groups(len(spaces), lambda i, j: spaces[i].shape == spaces[j].shape and bool(
@@ -73,10 +75,9 @@ def _alike_bodies(structure: Structure, bodies: tuple[int, ...],
 @lru_cache(KEPT)
 def proportional_joints(structure: Structure) -> tuple[tuple[str, ...], ...]:
     """Return groups of joints whose rates are in the same proportion whatever the drives do."""
-    position, rest, _ = _states(structure)
     names = tuple(structure.rows)
     at = [int(structure.tables.coordinate[structure.rows[name]]) for name in names]
-    rates = _bare(structure).at(position, 0 * rest, 0 * rest).motion.drive_to_joint
+    rates = _moving(structure).motion.drive_to_joint
     rows = rates[:, at].transpose(1, 0, 2).reshape(len(names), -1)
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     unit = rows / np.where(size > 0, size, 1.0)
@@ -84,29 +85,16 @@ def proportional_joints(structure: Structure) -> tuple[tuple[str, ...], ...]:
         len(names), lambda i, j: bool(abs(abs(unit[i] @ unit[j]) - 1.0) < SAME)))
 
 
-def _bare(structure: Structure, bodies: tuple[int, ...] = (),
-          gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mechanism:
-    """Return a mechanism whose bodies have no mass."""
-    return Mechanism(structure, np.array(bodies, dtype=int), np.zeros((len(bodies), PARAMETERS)),
-                     np.zeros(len(structure.drives)), gravity)
-
-
-def _states(structure: Structure) -> tuple[Array, Array, Array]:
-    """Return random states of the drives about home, or the middle of their ranges."""
+def _moving(structure: Structure) -> LinkMotion:
+    """Return the links at random states of the drives about home, or amid their ranges."""
     rng = np.random.default_rng(0)
     middle, reach = structure.room(WIDEST)
     position, velocity, acceleration = rng.uniform(-1, 1, (3, SAMPLES, len(middle)))
-    bare = _bare(structure)
     for halving in range(HALVINGS):
-        at = middle + 0.5 ** (1 + halving) * reach * position
-        try:
-            bare.at(at, velocity, acceleration)
-        except PprsError:
-            continue
-        break
-    else:
-        at = np.broadcast_to(middle, position.shape).copy()
-    return at, velocity, acceleration
+        with suppress(PprsError):
+            return LinkMotion.of(structure, middle + 0.5 ** (1 + halving) * reach * position,
+                                 velocity, acceleration)
+    return LinkMotion.of(structure, np.tile(middle, (SAMPLES, 1)), velocity, acceleration)
 
 
 def _space(columns: Array) -> Array:

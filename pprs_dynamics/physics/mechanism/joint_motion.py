@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.motion import checked_matrix, checked_times, spline_through
+from pprs_dynamics.physics.mechanism.motion import checked_matrix, checked_times
 
 GRID = 512  # points of a period at which peaks are looked for
 STOP_POINTS = 10
@@ -210,28 +210,3 @@ class JointMotion:
         rest = np.zeros_like(self.position[-1:])
         return replace(self, position=self.position[-1:], velocity=rest, acceleration=rest,
                        time=np.zeros(1), channels={})
-
-
-def position_spline_derivatives(time: Array, position: Array) -> tuple[Array, Array]:
-    """Return velocities and accelerations of splines through positions, at the positions.
-
-    Parameters
-    ----------
-    time : (N,) array
-        Strictly increasing [s], at least four.
-    position : (N, D) array
-
-    Returns
-    -------
-    velocity, acceleration : (N, D) arrays
-        NaN throughout where positions or times are so far apart that no spline can be computed.
-
-    Raises
-    ------
-    MotionError
-        For positions or times that are none.
-    """
-    places = checked_matrix('position', position, position.shape[1])
-    knots = checked_times(time, len(places))
-    _, velocity, acceleration = spline_through(knots, places, knots)
-    return velocity, acceleration

@@ -19,7 +19,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, inertial_in
+from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    PRISMATIC,
+    REVOLUTE,
+    inertial_in,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion, ToolPose
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -235,7 +240,8 @@ class Mechanism:
     @property
     def turning(self) -> tuple[str, ...]:
         """Drives that turn."""
-        return self.structure.turning
+        return tuple(name for name, kind in zip(self.drives, self.structure.kinds, strict=True)
+                     if kind == REVOLUTE)
 
     @property
     def position_step(self) -> float:

@@ -99,39 +99,36 @@ def checked_times(time: ArrayLike, samples: int) -> Array:
     return times
 
 
-def load_splines() -> None:
-    """Load what `spline_derivatives` needs: half a second, that nobody else should wait for."""
-    import scipy.interpolate  # noqa: F401
-
-
-def spline_derivatives(
-    time: ArrayLike, position: ArrayLike, orientation: ArrayLike,
-) -> tuple[Array, Array]:
-    """Return velocities and accelerations of splines through poses, at the poses.
+def spline_derivatives(time: Array, place: Array, is_pose: bool) -> tuple[Array, Array]:
+    """Return velocities and accelerations of splines through points, at the points.
 
     Parameters
     ----------
-    time : (N,) array_like
+    time : (N,) array
         Strictly increasing times [s], at least four.
-    position : (N, 3) array_like
-        [m].
-    orientation : (N, 4) array_like
-        Unit quaternions x, y, z, w.
+    place : (N, D) array
+        Positions of drives, or poses: position [m] and unit quaternion x, y, z, w.
+    is_pose : bool
 
     Returns
     -------
-    velocity, acceleration : (N, 6) arrays
-        Linear, then angular, in `base`; NaN throughout where poses or times are so far apart
-        that no spline can be computed.
+    velocity, acceleration : (N, D) arrays
+        Of poses (N, 6), linear, then angular, in `base`; NaN throughout where points are so far
+        apart that no spline can be computed.
 
     Raises
     ------
     MotionError
-        For poses or times that are none, or fewer than four.
+        For points or times that are none, or fewer than four poses.
     """
-    knots, places, turns = checked_poses(time, position, orientation)
-    rows = spline_rows(knots, places, turns, knots)
-    return rows[:, 7:13], rows[:, 13:]
+    if is_pose:
+        knots, places, turns = checked_poses(time, place[:, :3], place[:, 3:])
+        rows = spline_rows(knots, places, turns, knots)
+        return rows[:, 7:13], rows[:, 13:]
+    places = checked_matrix('position', place, place.shape[1])
+    knots = checked_times(time, len(places))
+    _, velocity, acceleration = spline_through(knots, places, knots)
+    return velocity, acceleration
 
 
 def checked_poses(

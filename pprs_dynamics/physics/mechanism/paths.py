@@ -111,13 +111,11 @@ class Excitation:
     seed : int
         Of the random coefficients.
     amplitude : float
-        Largest excursion from the centre along every axis [m].
+        Largest excursion from `HOME` along every axis [m].
     tilt : float
         Largest component of the rotation vector [rad].
     highest_frequency : float
         Of the series [Hz].
-    centre : 3 floats
-        Position around which the platform moves [m].
     """
 
     duration: float = 20.0
@@ -125,7 +123,6 @@ class Excitation:
     amplitude: float = 0.06
     tilt: float = 0.15
     highest_frequency: float = 0.6
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.5)
 
     def motion(self, time: ArrayLike) -> PlatformMotion:
         """Return the motion at times [s] within 0..duration, clipped to its ends outside."""
@@ -142,7 +139,7 @@ class Excitation:
         orientation = Rotation.from_rotvec(coordinates[:, 3:]).as_quat()
         inside = np.clip(times, 0.0, self.duration)
         motion = PlatformMotion.from_poses(
-            knots, coordinates[:, :3] + self.centre, orientation, at=inside)
+            knots, coordinates[:, :3] + HOME, orientation, at=inside)
         return motion.with_time(times)
 
     def _coordinates(self, t: Array) -> Array:

@@ -366,12 +366,6 @@ class Structure:
         return middle, np.maximum(np.minimum(upper - middle, middle - lower), 0.0)
 
     @property
-    def turning(self) -> tuple[str, ...]:
-        """Drives that turn."""
-        return tuple(name for name, kind in zip(self.drives, self.kinds, strict=True)
-                     if kind == REVOLUTE)
-
-    @property
     def held(self) -> tuple[str, ...]:
         """Coordinates that neither drives nor loops determine: they stand."""
         return tuple(self.coordinates[c] for c in self.mobility.held)

@@ -16,7 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.files.samples import Indices, Mask
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import FEWEST_POSES, PlatformMotion, spline_derivatives
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, RobotNames, nanoseconds
@@ -324,8 +324,7 @@ class RequestReader:
     def _fill_in(self, numbers: Array, time: Array, lacking: Mask) -> None:
         """Put the derivatives of a spline into the columns of those points that lack their own."""
         place, velocity, acceleration = self._parts(numbers)
-        derivatives = (spline_derivatives(time, place[:, :3], place[:, 3:]) if self._is_body
-                       else position_spline_derivatives(time, place))
+        derivatives = spline_derivatives(time, place, self._is_body)
         for given, values, rows in zip((velocity, acceleration), derivatives, lacking.T,
                                        strict=True):
             if not np.isfinite(values).all():
