@@ -18,6 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.joint_motion import DrivePath, JointMotion
+from pprs_dynamics.physics.mechanism.motion import load_splines
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, write_joint_trajectory
@@ -233,7 +234,7 @@ class Feedforward:
         self._model, self._scale = model, node_values['feedforward_scale']
         self._scales = self._scale != 1
         if node_values['missing_derivatives'] == SPLINE:
-            import scipy.interpolate  # noqa: F401 half a second, that no message should wait for
+            load_splines()
         self._clamps = node_values['limit_policy'] == CLAMP
         self._limits = limits_of(model, node_values)
 

@@ -18,8 +18,11 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+from numba.np import arrayobj
 
-from pprs_dynamics.physics.mechanism.vectors import elements
+from pprs_dynamics.physics.mechanism.vectors import block, elements
 
 PACKAGE = 'pprs_dynamics'
 
@@ -101,6 +104,8 @@ def _bound(function: FunctionType) -> FunctionType:
     def callee(used: Any) -> Any:
         if used is elements:
             return _compiled(_unchanged)
+        if used is block:
+            return _block
         if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
             return _compiled(used)
         # Numba compiles a callee again for each Python integer that is a constant.
@@ -119,6 +124,23 @@ def _bound(function: FunctionType) -> FunctionType:
 def _unchanged(named: Any) -> Any:
     """Return arrays as they are, of which compiled code reads elements fast enough."""
     return named
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _block(context: Any, row: Any, start: Any, shape: Any) -> Any:
+    """Return what `block` does: NumPy's `reshape` takes seven times as long to compile."""
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source = arrayobj.make_array(row)(context, builder, arguments[0])
+        found = arrayobj.make_array(signature.return_type)(context, builder)
+        sizes = cgutils.unpack_tuple(builder, arguments[2])
+        strides = [source.itemsize]
+        for size in reversed(sizes[1:]):
+            strides.insert(0, builder.mul(strides[0], size))
+        arrayobj.populate_array(found, builder.gep(source.data, [arguments[1]]), sizes, strides,
+                                source.itemsize, None)
+        return found._getvalue()
+
+    return types.Array(row.dtype, len(shape), 'C')(row, start, shape), code
 
 
 def _inlined(function: FunctionType) -> Any:

@@ -99,6 +99,11 @@ def checked_times(time: ArrayLike, samples: int) -> Array:
     return times
 
 
+def load_splines() -> None:
+    """Load what `spline_derivatives` needs: half a second, that nobody else should wait for."""
+    import scipy.interpolate  # noqa: F401
+
+
 def spline_derivatives(time: Array, place: Array, is_pose: bool) -> tuple[Array, Array]:
     """Return velocities and accelerations of splines through points, at the points.
 

@@ -31,6 +31,7 @@ from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.vectors import (
     Vector,
+    block,
     dot,
     elements,
     minus,
@@ -315,11 +316,10 @@ def _reader(kind: type) -> Callable[..., Any]:
         if name == FIRST_OF_REALS:
             lines.append('    at = 0')
         source = 'more' if kind is Model and _is_real(name) else 'row'
-        count = ' * '.join(map(str, shape))
-        reshaped = f'.reshape(({", ".join(map(str, shape))}))' if len(shape) > 1 else ''
-        lines += [f'    of_{name} = {source}[at:at + {count}]{reshaped}', f'    at += {count}']
+        lines += [f'    of_{name} = block({source}, at, ({", ".join(map(str, shape))},))',
+                  f'    at += {" * ".join(map(str, shape))}']
     lines.append(f'    return Kind({", ".join(f"of_{name}" for name in _shapes(kind))})')
-    namespace: dict[str, Any] = {'Kind': kind, '__name__': __name__}
+    namespace: dict[str, Any] = {'Kind': kind, 'block': block, '__name__': __name__}
     exec('\n'.join(lines), namespace)
     read: Callable[..., Any] = namespace['read']
     return read

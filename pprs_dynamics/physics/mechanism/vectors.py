@@ -124,6 +124,11 @@ def dot(a: Vector, b: Vector) -> Value:
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
+def block(row: Any, start: int, shape: tuple[int, ...]) -> Any:
+    """Return a table of some shape within a row of numbers."""
+    return row[start:start + math.prod(shape)].reshape(shape)
+
+
 def elements(named: Any) -> Any:
     """Return a named tuple of arrays whose elements are Python's numbers, which are faster.
 
