@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -67,7 +68,9 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
                 # What waits at a worker that dies would count as what killed it.
                 'distributed.scheduler.worker-saturation': 1.0,
                 'distributed.scheduler.worker-ttl': SILENCE,
-                'distributed.admin.log-format': '', 'logging.distributed': 'critical'}
+                'distributed.admin.log-format': ''}
+    for name in ('distributed', 'distributed.client'):  # what happens is one sentence of ours
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with dask.config.set(settings):
         try:
             if scheduler is not None:
