@@ -213,7 +213,7 @@ class PinocchioPeer(Peer):
         self.data = self.model.createData()
         self.pool = pin.ModelPool(self.model, 1) if hasattr(pin, 'ModelPool') else None
 
-    def mujoco_trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
+    def trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
         (v1, v2, v3), (w1, w2, w3), (a1, a2, a3), (e1, e2, e3) = v, omega, a, epsilon
         R11, R12, R13, R21, R22, R23, R31, R32, R33 = R
         # Spatial acceleration, and everything in the platform's frame.
@@ -281,7 +281,7 @@ class MujocoPeer(Peer):
         self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
         self.result = self.data.qfrc_inverse
 
-    def mujoco_trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
+    def trees(self, P, quaternion, R, v, omega, a, epsilon, q, q_dot, q_ddot) -> np.ndarray:
         (w1, w2, w3), (e1, e2, e3) = omega, epsilon
         R11, R12, R13, R21, R22, R23, R31, R32, R33 = R
         x, y, z, w = quaternion.tolist()

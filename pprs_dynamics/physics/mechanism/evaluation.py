@@ -6,8 +6,8 @@
 A *loop* is a function that evaluates equations for all samples of tables in turn and writes to
 other tables.
 
-Loading compiled code takes 0.3 s, compiling it the first time 15 s. Where nothing may wait for
-that, the same functions run as Python: 0.2 ms a sample, 8 ms of a hexapod.
+Loading compiled code takes 0.3 s, compiling it the first time up to 10 s. Where nothing may wait
+for that, the same functions run as Python: 0.2 ms a sample, 8 ms of a hexapod.
 """
 
 from __future__ import annotations
