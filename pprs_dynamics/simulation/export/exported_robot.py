@@ -346,14 +346,10 @@ class TreePositions:
 
     def __init__(self, model: DriveModel) -> None:
         robot = export_robot(model, URDF)
-        self._mechanism = robot.mechanism
-        joints = [body for body in robot.bodies if body.kind != FREE]
-        free = [body for body in robot.bodies if body.kind == FREE]
-        self.names = tuple(body.joint for body in joints)
-        self.base = robot.mechanism.structure.moved_by[0]
-        self.bodies = tuple(body.name for body in free)
-        self._rows = np.array([body.row for body in joints])
-        self._free = tuple(body.row for body in free)
+        self._mechanism, structure = robot.mechanism, robot.mechanism.structure
+        self.names, self.base = tuple(structure.rows), structure.moved_by[0]
+        self._free = {body.name: body.row for body in robot.bodies if body.kind == FREE}
+        self.bodies = tuple(self._free)
 
     def at(self, position: Array) -> TreePose:
         """Return where all is, for the positions of the drives, (D,).
@@ -365,13 +361,12 @@ class TreePositions:
         """
         given = np.array(position, dtype=float)[None]
         still = np.zeros_like(given)
-        state = self._mechanism.at(given, still, still)
-        t, rows, q = self._mechanism.structure.tables, self._rows, state.motion.q[0]
+        links = self._mechanism.at(given, still, still)
         bodies = np.empty((len(self._free), 7))
-        for k, row in enumerate(self._free):
-            bodies[k, :3] = state.motion.p[0, row]
-            bodies[k, 3:] = Rotation.from_matrix(state.motion.R[0, row]).as_quat()
-        return TreePose(t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows], bodies)
+        for k, row in enumerate(self._free.values()):
+            bodies[k, :3] = links.motion.p[0, row]
+            bodies[k, 3:] = Rotation.from_matrix(links.motion.R[0, row]).as_quat()
+        return TreePose(np.array([links.joint_position(name)[0] for name in self.names]), bodies)
 
 
 # --- files ---------------------------------------------------------------------------------------
