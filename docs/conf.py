@@ -10,7 +10,10 @@ import shutil
 import sys
 from pathlib import Path
 
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxTranslator
 
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent)]
@@ -40,6 +43,8 @@ rosdoc2_settings = {'support_markdown': False, 'override_theme': False}
 # Headings get the anchors that a reader of the repository's pages sees, too.
 myst_heading_anchors = 3
 myst_enable_extensions = ['dollarmath']
+# Equations are part of the page: MathJax, the default, is fetched from a network.
+html_math_renderer = 'mathml'
 # Notebooks are run by tests; the site shows what is in the file.
 nb_execution_mode = 'off'
 
@@ -79,8 +84,16 @@ def escape_marks(app: Sphinx, what: str, name: str, thing: object, options: obje
     lines[:] = [re.sub(r'(?<![*\\])\*(?=\w)', r'\*', line.replace('|', r'\|')) for line in lines]
 
 
+def write_equation(translator: SphinxTranslator, node: nodes.Element) -> None:
+    """Write an equation as MathML, which browsers draw themselves."""
+    is_block = isinstance(node, nodes.math_block)
+    translator.body.append(tex2mathml(node.astext(), as_block=is_block))
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
     """Let Sphinx write the generated pages before it looks for sources."""
+    app.add_html_math_renderer('mathml', (write_equation, None), (write_equation, None))
     app.connect('builder-inited', write_generated_pages)
     app.connect('source-read', link_results)
     # Before napoleon, which makes marks of its own.

@@ -94,7 +94,7 @@ class FeedforwardNode(ManagedNode):
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
         self._status = StatusReporter(
-            self, {}, self._counters, hardware_of(self._settings.model), self._refresh,
+            self, self._counters, hardware_of(self._settings.model), self._refresh,
             ('~/commands',))
         self._refresh()
         self.begin(node_values[AUTOSTART.name])
@@ -238,8 +238,8 @@ class FeedforwardNode(ManagedNode):
             self._margins_due = now + MARGINS_PERIOD
             self._margins = left = margins(self._settings.model, answer.forces.mechanism)
             if left.singularity is not None:
-                self._status.facts['singularity_margin'] = round(left.singularity, 6)
-            self._status.facts['workspace_margin'] = round(left.workspace, 6)
+                self._status.content.singularity_margin = round(left.singularity, 6)
+            self._status.content.workspace_margin = round(left.workspace, 6)
             self._beyond_curve = next((
                 said for effect in self._settings.model.effects
                 if isinstance(effect, MeasuredCurve)
@@ -388,10 +388,10 @@ class FeedforwardNode(ManagedNode):
 
     @property
     def _lagging(self) -> bool:
-        return bool(self._status.facts.get('lagging'))
+        return bool(self._status.content.lagging)
 
     def _refresh(self) -> None:
-        """Update the facts that are published once a second."""
+        """Update the content that is published once a second."""
         if self._last_unchecked is not None and self._status.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
             self._report_condition(self._last_unchecked)
@@ -401,13 +401,15 @@ class FeedforwardNode(ManagedNode):
         self._counted = (accepted, passed, now)
         threshold = self._settings.node_values['lag_warning']
         lag = self._lag.summary()
-        waits = (lag['p50'] or 0.0) > threshold or passed - passed_before > accepted - before
-        self._status.facts.update(
-            self._settings.facts, state=self.state, assumed=self._settings.model.assumed_at_start,
-            preparing=self._preparation is not None and self._preparation.is_alive(),
-            rate=round((accepted - before) / max(now - then, 1e-3), 1),
-            compute_time=self._compute_time.summary(), lag=lag,
-            lagging=bool(threshold and accepted > before and waits))
+        waits = (lag.p50 or 0.0) > threshold or passed - passed_before > accepted - before
+        content = self._status.content
+        content.model = self._settings.provenance
+        content.changes = len(self._settings.history or ())
+        content.state, content.assumed = self.state, self._settings.model.assumed_at_start
+        content.preparing = self._preparation is not None and self._preparation.is_alive()
+        content.rate = round((accepted - before) / max(now - then, 1e-3), 1)
+        content.compute_time, content.lag = self._compute_time.summary(), lag
+        content.lagging = bool(threshold and accepted > before and waits)
 
 
 def _since(stamp: int) -> float:

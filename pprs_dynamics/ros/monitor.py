@@ -39,7 +39,7 @@ from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.simulation.export.exported_robot import TreePose, TreePositions
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import for_json
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -66,6 +66,9 @@ PARAMETERS = (
                    'absolute or in the namespace of this one', stays=True),
 )
 
+# `~/diagnosis` before the first window that was diagnosed.
+NOTHING: dict[str, Any] = {'effects': [], 'withdrawn': [], 'confirmed': False, 'note': '',
+                           'since': None, 'text': '', 'window': None}
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
 FEW = 0.5
 ENOUGH = 20  # samples in a second, whose share says anything
@@ -147,7 +150,7 @@ class MonitorNode(ManagedNode):
         self.create_service(Trigger, '~/adopt_confirmed', self._adopt,
                             callback_group=ReentrantCallbackGroup())
         self._status = StatusReporter(
-            self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
+            self, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
         self.begin(node_values[AUTOSTART.name])
 
@@ -230,8 +233,8 @@ class MonitorNode(ManagedNode):
         self._publish(compared)
         running = self._stream.comparison.running_error()
         self._error.publish(Float64MultiArray(data=running.tolist()))
-        self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
-                                       for value in running.tolist()]
+        self._status.content.error = [round(value, 6) if np.isfinite(value) else None
+                                      for value in running.tolist()]
         unit = common_effort(self._settings.model.units)
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
@@ -266,7 +269,8 @@ class MonitorNode(ManagedNode):
         # The first window, and what is still on its way, is none that is missing.
         if came >= ENOUGH and compared > came:
             self._share = min(1.0, were / came)
-        self._status.facts.update(self._settings.facts, compared_share=round(self._share, 3))
+        self._status.content.model = self._settings.provenance
+        self._status.content.compared_share = round(self._share, 3)
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""
@@ -276,8 +280,7 @@ class MonitorNode(ManagedNode):
             self._adoptable = answer.pop(ADOPTED, {})
             if error := answer.pop('error', ''):
                 self.get_logger().warning(f'a window was not diagnosed: {error}')
-                answer = {'effects': [], 'confirmed': False, 'since': None, **answer,
-                          'note': error}
+                answer = {**NOTHING, **answer, 'note': error}
             changed = answer.get('text', '')
             if changed != self._changed:
                 self.get_logger().warning(changed or 'what had changed is gone')

@@ -91,7 +91,7 @@ class SimulatedRobotNode(Node):
         self._late_before, self._cycles_before = 0, 0
         # What is hidden is told to nobody who only listens: the log is the robot's own.
         self._status = StatusReporter(
-            self, {}, self._counters, f'simulated {hardware_of(self._model)}')
+            self, self._counters, f'simulated {hardware_of(self._model)}')
         self._states = publisher(self, JointState, 'joint_states')
         for kind, topic, take in ((JointState, '~/joint_command', self._take_setpoint),
                                   (Float64MultiArray, '~/commands', self._take_efforts)):

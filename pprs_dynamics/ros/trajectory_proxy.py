@@ -87,8 +87,9 @@ class TrajectoryProxyNode(Node):
         node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
-        self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
-                                      hardware_of(self._settings.model), self._refresh)
+        self._status = StatusReporter(
+            self, self._counters, hardware_of(self._settings.model), self._refresh)
+        self._status.content.action = node_values['action']
         self._refresh()
         warn_without_limits(self, self._settings.model, node_values)
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
@@ -105,7 +106,7 @@ class TrajectoryProxyNode(Node):
         self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
 
     def _refresh(self) -> None:
-        self._status.facts.update(self._settings.facts)
+        self._status.content.model = self._settings.provenance
 
     def _accept(self, goal: Any) -> GoalResponse:
         """Refuse a goal that breaks a rule, or asks for what the robot cannot do."""

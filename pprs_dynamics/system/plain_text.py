@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Mapping
-from typing import Any
 
 # Name of the error handler for streams that are not UTF-8.
 PLAIN = 'pprs_plain'
@@ -31,24 +29,6 @@ def counted(count: int, thing: str) -> str:
     if count != 1:
         noun = f'{noun[:-1]}ies' if noun.endswith('dy') else f'{noun}s'
     return f'{count} {noun}{" " * bool(rest)}{rest}'
-
-
-def for_json(content: Any) -> Any:
-    """Return what JSON can hold: text as `displayed`, None for numbers that are not finite.
-
-    Of what has a method `to_dict` the result of that.
-    """
-    if hasattr(content, 'to_dict'):
-        return for_json(content.to_dict())
-    if isinstance(content, Mapping):
-        return {displayed(key): for_json(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [for_json(value) for value in content]
-    if isinstance(content, str):
-        return displayed(content)
-    if isinstance(content, float) and content - content != 0.0:
-        return None
-    return content
 
 
 def _escaped(character: str) -> str:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from documents import checked
 from model_recordings import record, with_effects
 from pprs_command import pprs
 from single_axis import axis, axis_recording
@@ -92,7 +93,7 @@ def test_the_command_writes_the_dictionary_and_prints_the_text(
 ) -> None:
     monkeypatch.setenv('COLUMNS', '100')
     assert main(['compare', str(folder / 'run.csv'), '--json', str(folder / 'run.json')]) == 0
-    assert json.loads((folder / 'run.json').read_text()) == json.loads(
+    assert checked((folder / 'run.json').read_text(), 'compare') == json.loads(
         json.dumps(compared.to_dict()))
     printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
     assert printed[:8] == [line.strip() for line in str(compared).splitlines()[:8]]
@@ -133,9 +134,9 @@ def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:
     assert answer.adopted
     before, after = (compare(tried, runs[1]).rms for tried in (model, answer.model))
     assert after < 0.3 * before
-    for result in (found, answer):
+    for result, schema in ((found, 'diagnose'), (answer, 'adopt')):
         assert len(result.table())
-        json.dumps(result.to_dict())
+        checked(json.dumps(result.to_dict()), schema)
 
 
 @pytest.mark.slow

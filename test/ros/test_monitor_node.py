@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documents import checked
 from monitor_bench import RATE, START, MonitorBench
-from node_bench import bench, checked, overrides
+from node_bench import bench, overrides
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message

@@ -9,6 +9,9 @@ import json
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+import jsonschema
 
 PROJECT = Path(__file__).parents[2]
 FENCE = re.compile(r'^(`{3,}|~{3,})[^\n]*\n(.*?)^\1\s*$', re.M | re.S)
@@ -64,3 +67,11 @@ def anchors(text: str) -> set[str]:
         copies = sum(1 for each in found if re.fullmatch(rf'{re.escape(words)}(-\d+)?', each))
         found.add(f'{words}-{copies}' if copies else words)
     return found
+
+
+def checked(data: str, schema: str = 'status') -> dict[str, Any]:
+    """Return a JSON text's content, or raise ValidationError where its schema differs."""
+    content: dict[str, Any] = json.loads(data)
+    text = (PROJECT / f'config/schemas/{schema}.schema.json').read_text(encoding='utf-8')
+    jsonschema.validate(content, json.loads(text))
+    return content

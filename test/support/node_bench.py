@@ -5,15 +5,13 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-import jsonschema
 import rclpy
+from documents import checked
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -21,7 +19,6 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-SCHEMAS = Path(__file__).parents[2] / 'config' / 'schemas'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -81,13 +78,6 @@ class Bench:
     def spin_for(self, duration: float) -> None:
         """Spin for a time [s], e.g. to show that nothing comes."""
         self.spin_until(lambda: False, duration)
-
-
-def checked(data: str, schema: str = 'status') -> dict[str, Any]:
-    """Return a JSON of a node, or raise ValidationError where it is not as its schema says."""
-    content: dict[str, Any] = json.loads(data)
-    jsonschema.validate(content, json.loads((SCHEMAS / f'{schema}.schema.json').read_text()))
-    return content
 
 
 def overrides(**values: Any) -> list[Parameter]:

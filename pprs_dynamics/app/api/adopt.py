@@ -87,7 +87,7 @@ class AdoptionResult(Result):
         The answer with all that it was decided from.
     """
 
-    rows = 'parameters'  # what `table` shows
+    rows, json_keys = 'parameters', ('**adoption',)  # `rows` is what `table` shows
     inputs: Inputs
     adoption: Adoption
 
@@ -119,10 +119,6 @@ class AdoptionResult(Result):
         if not self.adopted:
             raise RefusedError(f'{self.adoption.effect} is refused: {self.reason}')
         write_model(path, self.model.values, self.inputs.base)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs adopt --json` writes."""
-        return self.adoption.to_dict()
 
     @property
     def headline(self) -> str:
@@ -224,7 +220,7 @@ class AdoptionRunResult(Result):
         What was adopted and refused, one after the other.
     """
 
-    rows = 'steps'  # what `table` shows
+    rows, json_keys = 'steps', ('**run',)  # `rows` is what `table` shows
     inputs: Inputs
     run: AdoptionRun
 
@@ -251,10 +247,6 @@ class AdoptionRunResult(Result):
         if self.refused and not self.run.adopted:
             raise RefusedError(self.run.reason)
         write_model(path, self.model.values, self.inputs.base)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        return self.run.to_dict()
 
     def view(self) -> Any:
         """Return adopted and refused effects, and the reason to end, for the terminal."""

@@ -51,6 +51,8 @@ class ComparisonResult(Result):
         How it was computed.
     """
 
+    json_keys = ('**comparison', 'verdict', 'effort_looks_like')
+
     inputs: Inputs
     residuals: Residuals
     comparison: Comparison
@@ -71,11 +73,10 @@ class ComparisonResult(Result):
         """Where it fails, what explains most of the squared error first."""
         return self.comparison.where
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs compare --json` writes."""
-        return {**self.comparison.to_dict(), 'verdict': self.verdict,
-                'effort_looks_like': effort_looks_like(
-                    recording.findings for recording in self.inputs.fitted)}
+    @property
+    def effort_looks_like(self) -> dict[str, str] | None:
+        """Kind of each drive's effort that is no measurement; null for none."""
+        return effort_looks_like(recording.findings for recording in self.inputs.fitted)
 
     def _drives(self) -> PlainTable:
         """Return the numbers of every drive; the grade comes last."""

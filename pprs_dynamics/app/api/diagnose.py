@@ -363,6 +363,8 @@ class DiagnosisResult(Result):
         The answer with all that it was decided from.
     """
 
+    json_keys = ('**diagnosis',)
+
     inputs: Inputs
     diagnosis: Diagnosis
 
@@ -380,10 +382,6 @@ class DiagnosisResult(Result):
     def fitted(self) -> DriveModel:
         """The model with what is missing, not checked as `adopt` does."""
         return self.diagnosis.adopted
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs diagnose --json` writes."""
-        return self.diagnosis.to_dict()
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:
         """Return what the terminal shows, with the command to go on with, or without."""

@@ -48,7 +48,7 @@ class FitResult(Result):
         The numbers, and the errors before, after and held out.
     """
 
-    rows = 'numbers'  # what `table` shows
+    rows, json_keys = 'numbers', ('**fit',)  # `rows` is what `table` shows
     inputs: Inputs
     fit: BaseFit
 
@@ -66,10 +66,6 @@ class FitResult(Result):
             Where it cannot be written, or is the file that was given.
         """
         write_model(path, self.model.values, self.inputs.base)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs fit --json` writes."""
-        return self.fit.to_dict()
 
     @property
     def _headline(self) -> str:

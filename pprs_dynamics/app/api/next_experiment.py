@@ -75,6 +75,7 @@ class ExperimentResult(Result):
     """
 
     rows = 'contests'  # what `table` shows
+    json_keys = ('**design', 'purpose', 'seed', 'rate')
     inputs: Inputs
     design: Experiment
     motion: PlatformMotion | JointMotion
@@ -91,11 +92,6 @@ class ExperimentResult(Result):
             Where it cannot be written.
         """
         write_motion(path, self.inputs.model.drives, self.motion)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs next-experiment --json` writes, but for the file's name."""
-        return {**self.design.to_dict(), 'purpose': self.purpose, 'seed': self.seed,
-                'rate': self.rate}
 
     @property
     def _contests(self) -> PlainTable:

@@ -18,6 +18,7 @@ from pprs_dynamics.app.report.terminal import as_html, as_text
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, describe
+from pprs_dynamics.system.json_records import JsonRecord
 
 if TYPE_CHECKING:
     # What results return, named for all of them.
@@ -38,17 +39,13 @@ def _described(recordings: Mapping[str, Recording]) -> Iterator[str]:
                f'{summary.rate:.6g} Hz, sha256 {digest}')
 
 
-class Result(ABC):
+class Result(JsonRecord, ABC):
     """An answer of the package's calls.
 
     Printed, it is what the command prints; in a notebook it shows the same.
     """
 
     rows: ClassVar[str]
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """Return what the command writes with --json."""
 
     @abstractmethod
     def view(self) -> Any:

@@ -14,11 +14,10 @@ import numpy as np
 
 from pprs_dynamics.app.api.inputs import Model, Progress, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report import charts
+from pprs_dynamics.app.report.charts import recording_rows
+from pprs_dynamics.app.report.figures import recording_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import plot_over_time
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits, common_unit
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -31,22 +30,6 @@ if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
 RATE = 500.0  # [Hz], of the 3-PPRS
-
-
-def recording_rows(recording: Recording, units: Sequence[DriveUnits],
-                   ) -> dict[str, dict[str, Array]]:
-    """Return positions and efforts of every drive, by quantity."""
-    return {f'{what} [{common_unit(units, unit)}]': dict(
-        zip(recording.drives, values.T, strict=True)) for what, unit, values in (
-            ('position', 'm', recording.position), ('effort', 'N', recording.effort))}
-
-
-def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
-    """Return a page with positions and efforts of every drive over time."""
-    page = Page(recording.name)
-    page.figure(charts.stacked(recording.time, recording_rows(recording, units), 300),
-                'Position and effort of every drive.', over_time=True)
-    return page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -67,6 +50,8 @@ class SimulationResult(Result):
     seed : int
     """
 
+    json_keys = ('samples', 'rate', 'seed', 'effects')
+
     model: DriveModel
     recording: Recording
     effects: tuple[dict[str, Any], ...]
@@ -84,10 +69,10 @@ class SimulationResult(Result):
         """
         write_recording(path, self.recording)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs simulate --json` writes, but for the file's name."""
-        return {'samples': len(self.recording.time), 'rate': self.rate, 'seed': self.seed,
-                'effects': list(self.effects)}
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.recording.time)
 
     def view(self) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""

@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.files import writable_file, write_text
+from pprs_dynamics.system.json_records import for_json
 from pprs_dynamics.system.numbers import parse_number, parse_whole
-from pprs_dynamics.system.plain_text import displayed, for_json
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.inputs import Inputs

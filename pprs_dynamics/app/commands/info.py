@@ -11,8 +11,8 @@ from dataclasses import asdict
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
-from pprs_dynamics.app.api.simulate import recording_page
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
+from pprs_dynamics.app.report.figures import recording_page
 from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
 from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
 from pprs_dynamics.inference.readings.findings import effort_looks_like, lines_of

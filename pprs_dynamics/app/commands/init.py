@@ -11,9 +11,9 @@ from dataclasses import asdict
 from shlex import quote
 
 from pprs_dynamics.app.api.first_model import first_model
-from pprs_dynamics.app.api.simulate import recording_rows
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
 from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
+from pprs_dynamics.app.report.charts import recording_rows
 from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.inference.diagnosis.next_step import SECOND

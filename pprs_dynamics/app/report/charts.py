@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.drives import DriveUnits, common_unit
 from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.measurement.files.recording import Recording
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
 LINES = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
@@ -54,14 +55,21 @@ def rows_over_time(count: int, height: int, heights: Sequence[float] | None = No
     return figure
 
 
-def stacked(time: Array, rows: Mapping[str, Mapping[str, Array]], height: int = 200,
-            points: int = POINTS) -> Any:
+def recording_rows(recording: Recording, units: Sequence[DriveUnits],
+                   ) -> dict[str, dict[str, Array]]:
+    """Return positions and efforts of every drive, by quantity."""
+    return {f'{what} [{common_unit(units, unit)}]': dict(
+        zip(recording.drives, values.T, strict=True)) for what, unit, values in (
+            ('position', 'm', recording.position), ('effort', 'N', recording.effort))}
+
+
+def stacked(time: Array, rows: Mapping[str, Mapping[str, Array]], height: int = 200) -> Any:
     """Return a figure with a row of named curves over time [s] for each quantity."""
     figure = rows_over_time(len(rows), height * len(rows) + 80, margin={**MARGIN, 't': 40})
     colours: dict[str, str] = {}
     for row, (label, curves) in enumerate(rows.items(), start=1):
         for name, values in curves.items():
-            times, shown = thinned(time, values, points=points)
+            times, shown = thinned(time, values)
             is_new = name not in colours
             colour = colours.setdefault(name, LINES[len(colours) % len(LINES)])
             figure.add_trace(trace(times, shown, name, colour, legendgroup=name,

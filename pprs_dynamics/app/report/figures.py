@@ -15,6 +15,7 @@ import numpy as np
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.fit_curve import curve_variable
 from pprs_dynamics.inference.diagnosis.comparison import Comparison
@@ -29,6 +30,7 @@ from pprs_dynamics.inference.residuals.profiles import (
     error_spectrum,
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.measurement.files.recording import Recording
 
 FINE_BINS = 24
 POINTS = 400  # of a curve, and of the errors around it
@@ -38,6 +40,14 @@ SPAN = 5.0  # [s], of what is drawn over time
 Integers = np.typing.NDArray[np.int_]
 TIME = {'title': 'time [s]', **charts.SECONDS}
 AFTER, FLOOR, OTHER = '#009E73', '#1a1a1a', '#bbbbbb'
+
+
+def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
+    """Return a page with positions and efforts of every drive over time."""
+    page = Page(recording.name)
+    page.figure(charts.stacked(recording.time, charts.recording_rows(recording, units), 300),
+                'Position and effort of every drive.', over_time=True)
+    return page
 
 
 def before_and_after(before: Residuals, after: Residuals, drive: int, floor: float) -> Any:

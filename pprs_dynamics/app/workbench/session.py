@@ -24,8 +24,8 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.system.json_records import for_json
 from pprs_dynamics.system.numbers import finite
-from pprs_dynamics.system.plain_text import for_json
 
 
 class Session:

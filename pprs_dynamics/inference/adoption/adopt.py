@@ -50,7 +50,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import EFFORT_UNITS
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import JsonRecord
 
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
@@ -484,7 +484,7 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
 
 
 @dataclass(frozen=True)
-class AdoptionRun:
+class AdoptionRun(JsonRecord):
     """Result of adopting all reported effects: the steps, and why the run ended.
 
     Parameters
@@ -497,6 +497,8 @@ class AdoptionRun:
         With all that was adopted.
     """
 
+    json_keys = ('ended', 'reason', 'steps')
+
     steps: tuple[Adoption, ...]
     ended: str
     reason: str
@@ -506,13 +508,6 @@ class AdoptionRun:
     def adopted(self) -> tuple[Adoption, ...]:
         """The steps that were taken."""
         return tuple(step for step in self.steps if step.adopted)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the run for JSON."""
-        content: dict[str, Any] = for_json(
-            {'ended': self.ended, 'reason': self.reason, 'steps': self.steps})
-        return content
-
 
 def adopt_all(
     model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),

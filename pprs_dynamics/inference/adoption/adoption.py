@@ -22,13 +22,13 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fin
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import JsonRecord
 
 BLOCKS, VALIDATION = 'blocks', 'validation'
 
 
 @dataclass(frozen=True)
-class Adoption:
+class Adoption(JsonRecord):
     """The answer to a requested effect.
 
     Parameters
@@ -61,6 +61,10 @@ class Adoption:
     reason : str
         Why, in one sentence.
     """
+
+    json_keys = ('adopted', 'reason', 'effect', 'error_before', 'error_after', 'held_out_before',
+                 'held_out_after', 'held_out_on', 'noise_floor', 'forced', 'drives', 'objections',
+                 'remarks', 'rivals', 'parameters', 'calibrated', 'moments?', 'reference?')
 
     request: EffectRequest
     drives: tuple[str, ...] | None
@@ -112,16 +116,6 @@ class Adoption:
     def effect(self) -> str:
         """Name of the effect."""
         return self.request.name
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON of `pprs adopt`."""
-        content: dict[str, Any] = for_json({
-            **{name: getattr(self, name) for name in (
-                'adopted', 'reason', 'effect', 'error_before', 'error_after', 'held_out_before',
-                'held_out_after', 'held_out_on', 'noise_floor', 'forced', 'drives', 'objections',
-                'remarks', 'rivals', 'parameters', 'calibrated')},
-            **{name: value for name in ('moments', 'reference') if (value := getattr(self, name))}})
-        return content
 
 
 @dataclass(frozen=True)

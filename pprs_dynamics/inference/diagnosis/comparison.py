@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -37,8 +36,8 @@ from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns
+from pprs_dynamics.system.json_records import JsonRecord
 from pprs_dynamics.system.parallel import each
-from pprs_dynamics.system.plain_text import for_json
 
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
@@ -161,7 +160,7 @@ def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Bl
 
 
 @dataclass(frozen=True)
-class DriveComparison:
+class DriveComparison(JsonRecord):
     """Error of the model on one drive: rms, bias, peak, explained share and noise.
 
     Parameters
@@ -186,6 +185,8 @@ class DriveComparison:
     is_little : bool
         Whether the model explains little of the effort, see `search.explained_effort`.
     """
+
+    json_keys = ('rms', 'relative', 'bias', 'peak')
 
     drive: str
     rms: float
@@ -221,7 +222,7 @@ class DriveComparison:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(JsonRecord):
     """Errors of all drives, and of all together.
 
     Parameters
@@ -237,6 +238,8 @@ class Comparison:
     little : mapping of str to float
         Drives of whose effort the model explains little, with the shares.
     """
+
+    json_keys = ('drives', 'overall', 'explained', 'noise_floors', 'where')
 
     drives: Mapping[str, DriveComparison]
     rms: float
@@ -286,16 +289,36 @@ class Comparison:
         return (f'{error}. On {where} {what}{worst_is}{in_unit(worst.unexplained, worst.unit)}'
                 f'{kind if known else ""} ({worst.grade}).')
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of the interface; a number that is not defined is null."""
-        content: dict[str, Any] = for_json({
-            'drives': {name: {key: getattr(drive, key) for key in (
-                'rms', 'relative', 'bias', 'peak')} for name, drive in self.drives.items()},
-            'overall': {'rms': self.rms, 'relative': self.relative},
-            'explained': {name: drive.explained_variance for name, drive in self.drives.items()},
-            'noise_floors': {name: drive.noise_floor for name, drive in self.drives.items()},
-            'where': self.where})
-        return content
+    @property
+    def overall(self) -> OverallError:
+        """Errors over all drives."""
+        return OverallError(self.rms, self.relative)
+
+    @property
+    def explained(self) -> dict[str, float]:
+        """Share of each drive's effort variance that the model explains."""
+        return {name: drive.explained_variance for name, drive in self.drives.items()}
+
+    @property
+    def noise_floors(self) -> dict[str, float | None]:
+        """Root mean square of the noise of each drive [N]; null where it is not known."""
+        return {name: drive.noise_floor for name, drive in self.drives.items()}
+
+
+@dataclass(frozen=True)
+class OverallError(JsonRecord):
+    """Error over all drives.
+
+    Parameters
+    ----------
+    rms : float
+        Root mean square over drives and samples [N].
+    relative : float
+        The same over the effort's variation.
+    """
+
+    rms: float
+    relative: float
 
 
 def compare(residuals: Residuals, localisation: Localisation | None = None,

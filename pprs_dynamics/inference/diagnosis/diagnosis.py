@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import nan
-from typing import Any
+from math import isnan, nan
 
 import numpy as np
 
@@ -40,13 +39,13 @@ from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import JsonRecord
 
 Drives = tuple[str, ...] | None
 
 
 @dataclass(frozen=True)
-class RankedSet:
+class RankedSet(JsonRecord):
     """A set of effects with its cost.
 
     Parameters
@@ -60,6 +59,8 @@ class RankedSet:
     error_after : float
         Error with it, by linear forces [N]; NaN where that is not asked.
     """
+
+    json_keys = ('cost', 'terms', 'effects', 'barred?')
 
     names: tuple[tuple[str, Drives], ...]
     terms: CostTerms
@@ -81,20 +82,47 @@ class RankedSet:
         """Names of its effects."""
         return ' and '.join(name for name, _ in self.names)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of `sets` in the JSON."""
-        return {'cost': self.cost, 'terms': self.terms.to_dict(), 'effects': [
-            {'name': name, 'drives': drives} for name, drives in self.names],
-            **({'barred': self.barred} if self.barred else {})}
+    @property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """Effects, and `unknown, VARIABLE` for patterns of no catalogue."""
+        return tuple(NamedEffect(*named) for named in self.names)
 
-    def alone(self) -> dict[str, Any]:
-        """Return the JSON of a set of one effect."""
+    @property
+    def alone(self) -> EffectAlone:
+        """The effect of a set of one effect."""
         (name, drives), = self.names
-        return {'name': name, 'drives': drives, 'evidence': self.evidence}
+        error = None if isnan(self.error_after) else self.error_after
+        return EffectAlone(name, drives, self.evidence, error)
 
 
 @dataclass(frozen=True)
-class FoundEffect:
+class NamedEffect(JsonRecord):
+    """An effect of a set, and the drives that it is on; null: not on drives."""
+
+    name: str
+    drives: Drives
+
+
+@dataclass(frozen=True)
+class EffectAlone(NamedEffect):
+    """An effect alone, or as one more.
+
+    Parameters
+    ----------
+    evidence : float
+        By how much the cost falls with it; 0 is the threshold.
+    error_after : float or None
+        Error with it [N].
+    """
+
+    json_keys = ('name', 'drives', 'evidence', 'error_after?')
+
+    evidence: float
+    error_after: float | None = None
+
+
+@dataclass(frozen=True)
+class FoundEffect(JsonRecord):
     """An effect of a row of the table.
 
     Parameters
@@ -131,6 +159,10 @@ class FoundEffect:
     moments : mapping of str to Estimate
         First moments of added bodies: see `Estimates`.
     """
+
+    json_keys = ('name', 'drives', 'alike', 'since', 'course=kind_of_course', 'parameters',
+                 'moments?', 'in_model?', 'without', 'held_out_certainty=certainty', 'evidence',
+                 'error_before', 'error_after', 'held_out_before', 'held_out_after')
 
     effect: type[CatalogueEffect]
     drives: Drives
@@ -174,20 +206,20 @@ class FoundEffect:
             return f' since {plain(self.course.begin, 2)} s'
         return f', growing from zero at the start to this value at {plain(self.course.end, 2)} s'
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        course, moments, in_model = self.course, self.moments, self.in_model
-        content: dict[str, Any] = for_json({
-            'name': self.name, 'drives': self.drives,
-            'alike': [names for names in self.places if len(names) > 1],
-            'since': course.begin if course and course.kind == SINCE else None,
-            'course': course and course.kind, 'parameters': self.parameters,
-            **({'moments': moments} if moments else {}),
-            **({'in_model': in_model} if in_model else {}),
-            'without': self.without, 'held_out_certainty': self.certainty,
-            **{key: getattr(self, key) for key in (
-                'evidence', 'error_before', 'error_after', 'held_out_before', 'held_out_after')}})
-        return content
+    @property
+    def alike(self) -> tuple[tuple[str, ...], ...]:
+        """Links or joints that no motion separates from the named one."""
+        return tuple(names for names in self.places if len(names) > 1)
+
+    @property
+    def since(self) -> float | None:
+        """When it began, from the start of the first recording [s]; null: always."""
+        return self.course.begin if self.course and self.course.kind == SINCE else None
+
+    @property
+    def kind_of_course(self) -> str | None:
+        """`since`, `during` or `drift`; null: it is there all the time."""
+        return self.course.kind if self.course else None
 
 
 @dataclass(frozen=True)
@@ -213,7 +245,7 @@ class RivalEffect:
 
 
 @dataclass(frozen=True)
-class SinceReference:
+class SinceReference(JsonRecord):
     """Coverage and explained error of the reference runs of a diagnosis.
 
     Parameters
@@ -229,6 +261,8 @@ class SinceReference:
     note : str
         What must be known of them; '' for nothing.
     """
+
+    json_keys = ('recordings', 'covered', 'explained', 'pace')
 
     recordings: tuple[str, ...]
     covered: float
@@ -251,13 +285,8 @@ class SinceReference:
         pace = float(np.median(here[moved] / there[moved])) if moved.any() else 1.0
         return cls(reference.names, design.carried.covered, explained, pace, reference.note)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {key: value for key, value in vars(self).items() if key != 'note'}
-
-
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(JsonRecord):
     """The answer.
 
     Parameters
@@ -313,6 +342,13 @@ class Diagnosis:
         All rows that were fitted.
     """
 
+    json_keys = (
+        'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'barred', 'depends_on',
+        'calibrated', 'detectable', 'held_out_on', 'above_noise', 'noise_floor', 'noise_floors',
+        'warnings', 'refit=refit_errors', 'candidates=each_alone', 'suspects=each_suspect',
+        'stick_slip', 'effort_looks_like=kinds_of_effort', 'explained', 'explained_after',
+        'little_explained=little', 'reference=since', 'changed_since')
+
     verdict: str
     effects: tuple[FoundEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
@@ -359,31 +395,52 @@ class Diagnosis:
         """Error with the fitted numbers of the model but without the effects [N]."""
         return root_mean_square(sum((effect.force for effect in self.effects), self.remaining))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON: the keys that docs/commands.md lists."""
-        content: dict[str, Any] = for_json({
-            **{key: getattr(self, key) for key in (
-                'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'barred',
-                'depends_on', 'calibrated', 'detectable', 'held_out_on', 'above_noise',
-                'noise_floor', 'noise_floors', 'warnings')},
-            'refit': {'error_before': root_mean_square(self.residuals.error),
-                      'error_after': self.refit},
-            'candidates': [{**ranked.alone(), 'error_after': ranked.error_after}
-                           for ranked in self.candidates],
-            'suspects': [ranked.alone() for ranked in self.suspects],
-            'stick_slip': {drive: {'frequency': slip.frequency, 'speed': slip.speed,
-                                   'step': slip.step, 'share_of_time': slip.share}
-                           for drive, slip in self.stick_slip.items()},
-            'effort_looks_like': effort_looks_like([self.effort_looks_like.values()]),
-            'explained': explained_shares(self.residuals), 'little_explained': self.little,
-            'explained_after': explained_shares(self.residuals, self.remaining),
-            'reference': self.since,
-            'changed_since': self.since and [effect.name for effect in self.effects]})
-        return content
+    @property
+    def refit_errors(self) -> ErrorFall:
+        """Error before and after a refit of the model's numbers, without the effects."""
+        return ErrorFall(root_mean_square(self.residuals.error), self.refit)
+
+    @property
+    def each_alone(self) -> tuple[EffectAlone, ...]:
+        """Each effect alone against none."""
+        return tuple(ranked.alone for ranked in self.candidates)
+
+    @property
+    def each_suspect(self) -> tuple[EffectAlone, ...]:
+        """Effects that slow noise would explain as well."""
+        return tuple(ranked.alone for ranked in self.suspects)
+
+    @property
+    def kinds_of_effort(self) -> dict[str, str] | None:
+        """Kind of each drive's effort that is no measurement; null for none."""
+        return effort_looks_like([self.effort_looks_like.values()])
+
+    @property
+    def explained(self) -> dict[str, float]:
+        """Share of each drive's effort variance that the input model explains."""
+        return explained_shares(self.residuals)
+
+    @property
+    def explained_after(self) -> dict[str, float]:
+        """Share that the model with the reported effects explains."""
+        return explained_shares(self.residuals, self.remaining)
+
+    @property
+    def changed_since(self) -> tuple[str, ...] | None:
+        """Effects that have changed since the reference; null without one."""
+        return None if self.since is None else tuple(effect.name for effect in self.effects)
 
 
 @dataclass(frozen=True)
-class DetectableSize:
+class ErrorFall(JsonRecord):
+    """Errors before and after a step [N]."""
+
+    error_before: float
+    error_after: float
+
+
+@dataclass(frozen=True)
+class DetectableSize(JsonRecord):
     """The smallest size at which an effect would have been reported, by drive or structure.
 
     Parameters
@@ -397,16 +454,23 @@ class DetectableSize:
     unit : str
     """
 
+    json_keys = ('name', 'drive', 'parameter=parameter_name', 'size', 'unit')
+
     effect: type[CatalogueEffect]
     drive: str | None
     parameter: Parameter
     size: float
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of `detectable` in the JSON."""
-        return {'name': self.effect.name, 'drive': self.drive, 'parameter': self.parameter.name,
-                'size': self.size, 'unit': self.unit}
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    @property
+    def parameter_name(self) -> str:
+        """Name of the parameter."""
+        return self.parameter.name
 
 
 def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[DetectableSize, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import JsonRecord
 
 # Standard errors by which a change must lower the error of the next window. With ten blocks in a
 # window, 2 accept one wrong effect in 30; two windows must report it as well.
@@ -37,7 +37,7 @@ MOST_VALUES = 3  # of an effect in its sentence
 
 
 @dataclass(frozen=True)
-class LiveEffect:
+class LiveEffect(JsonRecord):
     """An effect of the stream.
 
     Parameters
@@ -51,6 +51,8 @@ class LiveEffect:
     confirmed : bool
         Whether it was confirmed on a window that it was not fitted to.
     """
+
+    json_keys = ('**found', 'since', 'confirmed')
 
     found: FoundEffect
     names: frozenset[str]
@@ -75,11 +77,6 @@ class LiveEffect:
         what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
         return f'{what}: {values}, {since}'
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON of `pprs diagnose` for an effect, with since and confirmed."""
-        return {**self.found.to_dict(), 'since': self.since, 'confirmed': self.confirmed}
-
-
 @dataclass(frozen=True)
 class Window:
     """Diagnosis of one window of the stream, with the fitted models.
@@ -101,7 +98,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class LiveDiagnosis:
+class LiveDiagnosis(JsonRecord):
     """Effects found in a stream up to its latest window; immutable.
 
     Parameters
@@ -119,6 +116,9 @@ class LiveDiagnosis:
     reference : Reference, optional
         Since which every window is diagnosed.
     """
+
+    json_keys = ('**latest', 'effects', 'withdrawn', 'confirmed=is_confirmed', 'note', 'since',
+                 'text', 'window')
 
     model: DriveModel
     effects: tuple[LiveEffect, ...] = ()
@@ -143,19 +143,34 @@ class LiveDiagnosis:
             return {}
         return dict(self.last.adopted.values)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON of `pprs diagnose` on the latest window, with since and confirmed."""
-        latest = {} if self.last is None else self.last.diagnosis
-        little = word_little(latest.get('little_explained', {}), ' with the reported effects')
-        content: dict[str, Any] = for_json({
-            **latest, 'effects': self.effects, 'withdrawn': self.withdrawn,
-            'confirmed': bool(self.claimed), 'note': self.note,
-            'since': min((effect.since for effect in self.claimed if effect.since is not None),
-                         default=None),
-            'text': '; '.join(filter(None, [little, *(
-                effect.sentence(self.model.drives) for effect in self.claimed)])),
-            'window': self.last and self.last.span})
-        return content
+    @property
+    def latest(self) -> Annotated[Mapping[str, Any], Diagnosis]:
+        """JSON of the diagnosis of the latest window."""
+        return {} if self.last is None else self.last.diagnosis
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether any of the effects is claimed."""
+        return bool(self.claimed)
+
+    @property
+    def since(self) -> float | None:
+        """When the first of the claimed effects began [s]; null: from the start, or none."""
+        return min((effect.since for effect in self.claimed if effect.since is not None),
+                   default=None)
+
+    @property
+    def text(self) -> str:
+        """The claimed effects in words; empty for none."""
+        little = word_little(self.latest.get('little_explained', {}),
+                             ' with the reported effects')
+        return '; '.join(filter(None, [little, *(
+            effect.sentence(self.model.drives) for effect in self.claimed)]))
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Begin and end of the latest window, by the stamps of the stream [s]."""
+        return self.last.span if self.last else None
 
     def with_window(self, recording: Recording, start: float) -> LiveDiagnosis:
         """Return the live diagnosis updated by one more window.

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from pprs_dynamics.inference.diagnosis.quantities import listed, plain, sentence
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import DrivePatterns
+from pprs_dynamics.system.json_records import JsonRecord
 
 # The unit in which a variable is read: factor from SI, and name; of linear and of rotary drives.
 UNITS = {
@@ -61,7 +61,7 @@ def read_in(variable: str, units: DriveUnits) -> tuple[float, str]:
 
 
 @dataclass(frozen=True)
-class Statement:
+class Statement(JsonRecord):
     """One place where the model of a drive fails.
 
     Parameters
@@ -84,6 +84,8 @@ class Statement:
         Of the pattern over the record [N^2].
     """
 
+    json_keys = ('drive', 'variable', 'range', 'share_of_error', 'share_of_time', 'text')
+
     drive: str
     variable: str
     range: tuple[float, float] | None
@@ -98,14 +100,6 @@ class Statement:
     def is_of_speed(self) -> bool:
         """Whether `range` is one of the speed, in either direction."""
         return is_of_speed(self.kind, self.variable)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        return {'drive': self.drive, 'variable': self.variable,
-                'range': None if self.range is None else list(self.range),
-                'share_of_error': self.share_of_error, 'share_of_time': self.share_of_time,
-                'text': self.text}
-
 
 def word_statement(
     drive_patterns: DrivePatterns, candidate: UnknownCandidate, coefficients: Array,

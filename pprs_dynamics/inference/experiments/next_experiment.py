@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
@@ -34,6 +33,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
+from pprs_dynamics.system.json_records import JsonRecord
 
 PURPOSES = (SEPARATE, COMMISSION)
 SURE = 0.9  # probability from which a design counts as separating
@@ -55,7 +55,7 @@ class PurposeError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class ExpectedEvidence:
+class ExpectedEvidence(JsonRecord):
     """Expected evidence of a motion in one contest.
 
     Parameters
@@ -75,7 +75,7 @@ class ExpectedEvidence:
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class Accuracy(JsonRecord):
     """How well a number would be known.
 
     Parameters
@@ -95,7 +95,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(JsonRecord):
     """A designed motion with its expected evidence.
 
     Parameters
@@ -112,10 +112,14 @@ class Experiment:
     motion : callable
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     model : DriveModel
-    determined : (int, int), optional
+    determined, total : int, optional
         Of the first motion of a robot: combinations of the numbers of its model and of common
         effects that it determines better than the size at which they matter, and all.
     """
+
+    json_keys = ('separates', 'does_not_separate=fails', 'expected_evidence', 'load',
+                 'separated_by_load', 'question=kind', 'subjects', 'text', 'contests',
+                 'accuracy=accuracies', 'limits', 'duration', 'determined?', 'total?')
 
     kind: str
     subjects: tuple[str, ...]
@@ -125,7 +129,8 @@ class Experiment:
     duration: float
     motion: Callable[[Array], PlatformMotion | JointMotion]
     model: DriveModel = field(repr=False)
-    determined: tuple[int, int] | None = None
+    determined: int | None = None
+    total: int | None = None
 
     def forces(self, time: Array) -> Forces:
         """Return the model's forces along the motion at times [s]."""
@@ -173,7 +178,7 @@ class Experiment:
         """What it is for, and whether it will do, in a few sentences."""
         if self.determined is not None:
             return ('This motion measures the numbers of the model and of common effects. It '
-                    f'determines {self.determined[0]} of {self.determined[1]} combinations better '
+                    f'determines {self.determined} of {self.total} combinations better '
                     'than the size at which they matter. Collisions are not checked.')
         if self.kind == ESTIMATE:
             return (f'Only one explanation remains: {", ".join(self.subjects)}. This motion '
@@ -190,20 +195,6 @@ class Experiment:
                          f'with {self.load:g} kg more at the tool, and diagnose that recording '
                          'with this payload in the model.')
         return ' '.join(found)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON of the interface, and what the documentation adds to it."""
-        found = {'separates': [list(pair) for pair in self.separates],
-                 'does_not_separate': [list(pair) for pair in self.fails],
-                 'expected_evidence': self.expected_evidence,
-                 'load': self.load,
-                 'separated_by_load': [list(pair) for pair in self.separated_by_load],
-                 'question': self.kind, 'subjects': list(self.subjects), 'text': self.text,
-                 'contests': [vars(contest) for contest in self.contests],
-                 'accuracy': [vars(accuracy) for accuracy in self.accuracies],
-                 'limits': self.limits, 'duration': self.duration}
-        return found if self.determined is None else {
-            **found, 'determined': self.determined[0], 'total': self.determined[1]}
 
 
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
@@ -251,7 +242,7 @@ def design_experiment(question: Question, motions: Motions, seed: int,
     best = design(motions, drawn, lambda series: question.worth(question.gram(motions, series)),
                   seed, progress)
     after = question.known + question.gram(motions, best)
-    determined = None
+    determined: tuple[int, ...] = ()
     if question.kind == COMMISSION:
         gains = np.linalg.eigvalsh(question.precision.own(after))
         determined = int(np.sum(gains > 1)), len(gains)
@@ -260,7 +251,7 @@ def design_experiment(question: Question, motions: Motions, seed: int,
                                            for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
         best.duration, lambda time: motions.sampled(best, time), question.information.model,
-        determined)
+        *determined)
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from pprs_dynamics.inference.search.fitted_model import fitted_model, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.plain_text import for_json
+from pprs_dynamics.system.json_records import JsonRecord
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
 PART_OF_IT = ('a fault of the robot in these runs is now part of the model. Fit healthy runs '
@@ -36,7 +35,7 @@ class FitError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class BaseFit:
+class BaseFit(JsonRecord):
     """A fitted base model.
 
     Parameters
@@ -57,6 +56,9 @@ class BaseFit:
         Drives of whose effort the fitted model explains little, with the shares.
     """
 
+    json_keys = ('numbers', 'error_before=before', 'error_after=after', 'notes', 'held_out',
+                 'held_out_on', 'explained')
+
     model: DriveModel
     numbers: tuple[FittedNumber, ...]
     notes: tuple[str, ...]
@@ -66,15 +68,6 @@ class BaseFit:
     held_out_on: str
     explained: dict[str, float]
     little: dict[str, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fit for JSON."""
-        content: dict[str, Any] = for_json({
-            'numbers': [vars(number) for number in self.numbers],
-            'error_before': self.before, 'error_after': self.after,
-            **{key: getattr(self, key) for key in (
-                'notes', 'held_out', 'held_out_on', 'explained')}})
-        return content
 
 
 def fit_base(model: DriveModel, recordings: Sequence[Recording],

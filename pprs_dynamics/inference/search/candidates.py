@@ -25,6 +25,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.system.json_records import JsonRecord
 
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
@@ -34,7 +35,7 @@ LOAD, REVERSAL, FORM = 'load', 'reversal', 'form'
 
 
 @dataclass(frozen=True)
-class CostTerms:
+class CostTerms(JsonRecord):
     """Terms of a cost, each -2 ln of a probability but for a constant; they add up to it.
 
     Parameters
@@ -82,11 +83,6 @@ class CostTerms:
 
     def __sub__(self, other: CostTerms) -> CostTerms:
         return CostTerms(*map(sub, vars(self).values(), vars(other).values()))
-
-    def to_dict(self) -> dict[str, float]:
-        """Return the terms by name."""
-        return dict(vars(self))
-
 
 @dataclass(frozen=True)
 class Course:

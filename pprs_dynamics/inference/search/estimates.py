@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AXES, AddedBody
+from pprs_dynamics.system.json_records import JsonRecord
 
 DETERMINED = 0.5  # of a coefficient's prior variance, below which the recordings determine it
 # Of the usual precision, for the centre of a body about which the set says nothing.
@@ -36,20 +36,15 @@ FREE = 1e-2
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(JsonRecord):
     """A fitted value and its standard deviation."""
 
     value: float
     std: float
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        return {'value': self.value, 'std': self.std, 'unit': self.unit}
-
-
 @dataclass(frozen=True)
-class Calibration(Number):
+class Calibration(JsonRecord, Number):
     """A number of the model that was moved within its tolerance.
 
     Parameters
@@ -58,13 +53,10 @@ class Calibration(Number):
         Its fitted value and standard deviation.
     """
 
+    json_keys = ('key=label', 'before=value', 'after', 'std', 'unit')
+
     after: float
     std: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        return {'key': self.label, 'before': self.value, 'after': self.after, 'std': self.std,
-                'unit': self.unit}
 
 
 @dataclass(frozen=True)

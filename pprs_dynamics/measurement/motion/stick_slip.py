@@ -19,6 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.system.json_records import JsonRecord
 
 WINDOWS = (0.5, 1.0, 2.0, 4.0)  # over which a mean speed is taken, of several periods each [s]
 SLOW = 0.25  # of the mean speed, from which on a drive is no longer taken for standing
@@ -33,7 +34,7 @@ LEAST_STEP = 5.0  # quanta of the position in a slip: stairs of an encoder are n
 
 
 @dataclass(frozen=True)
-class StickSlip:
+class StickSlip(JsonRecord):
     """A relaxation oscillation of one drive.
 
     Parameters
@@ -48,6 +49,8 @@ class StickSlip:
     share : float
         Of the recording's time.
     """
+
+    json_keys = ('frequency', 'speed', 'step', 'share_of_time=share')
 
     frequency: float
     speed: float

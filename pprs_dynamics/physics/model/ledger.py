@@ -17,6 +17,7 @@ from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.model.keys import ANY, Key, as_list, below, blocks_below
+from pprs_dynamics.system.json_records import JsonRecord
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -25,7 +26,7 @@ NOT_KNOWN = 1e300  # a standard deviation that is none; ROS 2 files have no bett
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(JsonRecord):
     """One effect that was added to a model, set anew or taken out.
 
     Parameters
@@ -60,6 +61,8 @@ class Step:
         Keys that were not there before, and those that are not there any more.
     """
 
+    json_keys = ('*', 'drives=on_drives')
+
     effect: str
     error_before: float
     error_after: float
@@ -91,12 +94,10 @@ class Step:
     added: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the step for JSON."""
-        data = {name: as_list(value) for name, value in vars(self).items()}
-        data['drives'] = data['drives'] or None
-        data[PREVIOUS] = {key: as_list(value) for key, value in self.previous.items()}
-        return data
+    @property
+    def on_drives(self) -> tuple[str, ...] | None:
+        """Drives that the effect is on; null: not on drives."""
+        return self.drives or None
 
     def as_values(self, prefix: str) -> dict[str, Any]:
         """Return flat keys and values of a model file, empty lists left out."""

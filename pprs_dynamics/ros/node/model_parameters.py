@@ -26,7 +26,7 @@ from pprs_dynamics.ros.node.parameters import (
     overrides,
     with_hint,
 )
-from pprs_dynamics.ros.node.provenance import files_given
+from pprs_dynamics.ros.node.provenance import Provenance, files_given
 
 MOST_CHANGES = 100  # that are remembered
 Checked = TypeVar('Checked')
@@ -176,10 +176,9 @@ class ModelParameters:
             node.get_logger().warning('demo: the model is that of the paper\'s robot')
 
     @property
-    def facts(self) -> dict[str, Any]:
-        """Entries of `~/status`: files and hash of the model, and the number of its changes."""
-        changes = {} if self.history is None else {'changes': len(self.history)}
-        return {'model': {'files': self._files, 'sha256': self.model.fingerprint}, **changes}
+    def provenance(self) -> Provenance:
+        """Files and hash of the model."""
+        return Provenance(self._files, self.model.fingerprint)
 
     def _validated(self, changes: Iterable[Parameter]) -> tuple[DriveModel, dict[str, Any]]:
         self._refuse_foreign(changes)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,20 +16,37 @@ from typing import Any
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.system.json_records import JsonRecord
 from pprs_dynamics.system.plain_text import displayed
 
 OPTION = '--params-file'
 
 
-def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
+@dataclass(frozen=True)
+class ParameterFile(JsonRecord):
+    """Path and SHA-256 of a parameter file."""
+
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Provenance(JsonRecord):
+    """Parameter files of a node, and the SHA-256 of the model that is in force."""
+
+    files: tuple[ParameterFile, ...]
+    sha256: str
+
+
+def files_given(arguments: Sequence[str]) -> tuple[ParameterFile, ...]:
     """Return path and SHA-256 of the parameter files on a command line, in order.
 
     Without any it is the package's own model that a node runs.
     """
     paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
-    return [{'file': displayed(path.resolve()),
-             'sha256': hashlib.sha256(path.read_bytes()).hexdigest()}
-            for path in paths if path.is_file()]
+    return tuple(ParameterFile(displayed(path.resolve()),
+                               hashlib.sha256(path.read_bytes()).hexdigest())
+                 for path in paths if path.is_file())
 
 
 def hardware_of(model: DriveModel) -> str:
