@@ -241,9 +241,9 @@ class FeedforwardNode(ManagedNode):
                 self._status.content.singularity_margin = round(left.singularity, 6)
             self._status.content.workspace_margin = round(left.workspace, 6)
             self._beyond_curve = next((
-                said for effect in self._settings.model.effects
+                remark for effect in self._settings.model.effects
                 if isinstance(effect, MeasuredCurve)
-                and (said := effect.left(answer.forces.mechanism))), '')
+                and (remark := effect.left(answer.forces.mechanism))), '')
         left = self._margins
         fault = self._controller_fault
         if fault:
@@ -279,8 +279,8 @@ class FeedforwardNode(ManagedNode):
                 self._controller.was_heard
                 or self.count_publishers(self._controller_topic)):
             return ''
-        said = self._controller.fault()
-        return f'{self._joint_trajectory.topic_name}: {said}' if said else ''
+        fault = self._controller.fault()
+        return f'{self._joint_trajectory.topic_name}: {fault}' if fault else ''
 
     def _on_controller(self, state: Any) -> None:
         """Let a controller hold with gravity where it would hold without."""

@@ -99,13 +99,13 @@ class LiveJointStates(Node):
         name, status = self.owner.name, self.owner.status
         full_name = name if name.startswith('/') else (
             f'{self.get_namespace().rstrip("/")}/{name}')
-        said = [f'node {full_name}']
+        parts = [f'node {full_name}']
         if status.robot:
-            said.append(f'robot {status.robot}'
+            parts.append(f'robot {status.robot}'
                         + (f' of {", ".join(status.files)}' if status.files else ''))
         if takers := self._takers(full_name):
-            said.append(f'commands go to {", ".join(takers)}')
-        return '; '.join(said)
+            parts.append(f'commands go to {", ".join(takers)}')
+        return '; '.join(parts)
 
     def with_prefix(self, model: DriveModel) -> DriveModel:
         """Return a model with the parameter `joint_prefix` of this node, if it is given."""

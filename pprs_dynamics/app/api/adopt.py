@@ -67,8 +67,8 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
                             scales.get(effect.place_and_parameter(key)[1], inf)))
             for key, parameter in answer.parameters.items() if parameter.value != 0.0]
     return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
-        (told.name, answer.moments[told.name])
-        for told in sure_moments(effect, answer.parameters, answer.moments))]
+        (parameter.name, answer.moments[parameter.name])
+        for parameter in sure_moments(effect, answer.parameters, answer.moments))]
 
 
 class RefusedError(PprsError, ValueError):
@@ -126,9 +126,9 @@ class AdoptionResult(Result):
         answer = self.adoption
         what = answer.effect if answer.curve is not None else with_drives(
             answer.effect, answer.drives, answer.before.drives)
-        said = ('is refused' if not answer.adopted else
-                'is adopted by force, in spite of this' if answer.forced else 'is adopted')
-        return f'{what} {said}: {answer.reason}.'
+        outcome = ('is refused' if not answer.adopted else
+                   'is adopted by force, in spite of this' if answer.forced else 'is adopted')
+        return f'{what} {outcome}: {answer.reason}.'
 
     @property
     def _held_out(self) -> str:

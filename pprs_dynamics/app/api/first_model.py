@@ -405,11 +405,11 @@ def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for file in files:
         words = {*words_of(file.name.split('.')[0])}
-        told = [kind for kind in SETTLED if words & {*WORDS[kind]}]
+        kinds = [kind for kind in SETTLED if words & {*WORDS[kind]}]
         if words & {'time', *TIME_LIKE}:
-            told.append(FILE_TIME)
-        if told:
-            found.setdefault(told[-1] if len(told) > 1 else told[0], file)
+            kinds.append(FILE_TIME)
+        if kinds:
+            found.setdefault(kinds[-1] if len(kinds) > 1 else kinds[0], file)
     return found
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.adopt import adopt
-from pprs_dynamics.app.commands.arguments import add_shared, answer, tell
+from pprs_dynamics.app.commands.arguments import add_shared, answer, show
 from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
                             reference=options.reference)
     if result.adopted:
         result.save(options.output)
-    tell(result, options, screen, lambda: result.page(options.output))
+    show(result, options, screen, lambda: result.page(options.output))
     if not result.adopted:
         return 1
     screen.print(f'model: {shown(options.output)}', soft_wrap=True)

@@ -235,7 +235,7 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
     write_text(path, json.dumps(for_json(content), indent=2, ensure_ascii=False) + '\n')
 
 
-def tell(result: Result, options: argparse.Namespace, screen: Any,
+def show(result: Result, options: argparse.Namespace, screen: Any,
          page: Callable[[], Page] | None = None, view: Any = None, **beside: str) -> None:
     """Print a result, and write what --json and --report ask for: its view and page by default.
 

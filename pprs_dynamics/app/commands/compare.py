@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.compare import compare
-from pprs_dynamics.app.commands.arguments import add_shared, answer, output_file, tell
+from pprs_dynamics.app.commands.arguments import add_shared, answer, output_file, show
 from pprs_dynamics.app.report.terminal import shown, staged_bar
 
 EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen, result = answer(compare, options, whole=True, topic=options.topic)
-    tell(result, options, screen)
+    show(result, options, screen)
     if options.mcap:
         with staged_bar(screen) as progress:
             result.write_bag(options.mcap, progress)

@@ -14,7 +14,7 @@ from pprs_dynamics.app.commands.arguments import (
     add_shared,
     answer,
     require_output,
-    tell,
+    show,
     write_json,
 )
 from pprs_dynamics.app.report.terminal import shown, staged_bar
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     require_output(options, 'adopt-all')
     screen, result = answer(diagnose, options, reference=options.reference)
-    tell(result, options, screen,
+    show(result, options, screen,
          view=result.view(options.details, next_step=not options.adopt_all))
     return _adopt_all(result, options, screen) if options.adopt_all else 0
 

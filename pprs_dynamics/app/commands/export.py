@@ -63,12 +63,12 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, {'format': options.to, 'output': options.output,
                                   'not_expressed': list(robot.not_expressed),
                                   **found.to_dict()})
-    _say(screen, model, found, robot.not_expressed)
+    _print_summary(screen, model, found, robot.not_expressed)
     screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0
 
 
-def _say(screen: Any, model: DriveModel, found: Replayed, left: tuple[str, ...]) -> None:
+def _print_summary(screen: Any, model: DriveModel, found: Replayed, left: tuple[str, ...]) -> None:
     screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
         ('drive', 'effort', 'error'),

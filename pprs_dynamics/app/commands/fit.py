@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.fit import fit
-from pprs_dynamics.app.commands.arguments import add_shared, answer, tell
+from pprs_dynamics.app.commands.arguments import add_shared, answer, show
 from pprs_dynamics.app.report.terminal import shown
 
 EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
@@ -23,6 +23,6 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen, result = answer(fit, options)
     result.save(options.output)
-    tell(result, options, screen)
+    show(result, options, screen)
     screen.print(f'model: {shown(options.output)}', soft_wrap=True)
     return 0

@@ -9,7 +9,7 @@ import argparse
 import shlex
 
 from pprs_dynamics.app.api.next_experiment import RATE, next_experiment
-from pprs_dynamics.app.commands.arguments import POSES, add_shared, answer, output_file, seed, tell
+from pprs_dynamics.app.commands.arguments import POSES, add_shared, answer, output_file, seed, show
 from pprs_dynamics.app.report.terminal import shell_command, shown
 from pprs_dynamics.inference.experiments.next_experiment import PURPOSES, check_purpose
 from pprs_dynamics.system.plain_text import displayed
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     check_purpose(options.purpose, options.recordings)
     screen, result = answer(next_experiment, options, purpose=options.purpose, seed=options.seed)
-    tell(result, options, screen, output=options.output)
+    show(result, options, screen, output=options.output)
     result.save(options.output)
     if result.inputs.model.moves_joints:
         screen.print('[bold]Play it[/] with a controller of joint trajectories: positions, '

@@ -105,18 +105,18 @@ def _ended(given: Sequence[str]) -> int:
         text = displayed(error)
         if is_assumed and '`pprs init ' in text:  # the recording is of another robot
             text += "; no --model is given, and --demo takes that of the paper's robot"
-        _say(text, given)
+        _print_error(text, given)
         return 1 if isinstance(error, MisreadError) else 2
     except KeyboardInterrupt:
-        _say('interrupted', given)
+        _print_error('interrupted', given)
         return 130
     except MemoryError:
-        _say('there is not enough memory for this', given)
+        _print_error('there is not enough memory for this', given)
         return 2
     except OSError as error:
         # A full disk, a folder without permission: the name and the system's own reason.
         name = f'{displayed(error.filename)}: ' if error.filename else ''
-        _say(f'{name}{error.strerror or str(error) or type(error).__name__}', given)
+        _print_error(f'{name}{error.strerror or str(error) or type(error).__name__}', given)
         return 2
     return status
 
@@ -129,7 +129,7 @@ def _choose_model(options: argparse.Namespace) -> bool:
     return not getattr(options, 'demo', False) and bool(getattr(options, 'recordings', False))
 
 
-def _say(sentence: str, given: Sequence[str]) -> None:
+def _print_error(sentence: str, given: Sequence[str]) -> None:
     command = next((f' {word}' for word in given if word in COMMANDS), '')
     print(f'pprs{command}: {sentence}', file=sys.stderr)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.api.simulate import RATE, simulate
-from pprs_dynamics.app.commands.arguments import UsageError, number, output_file, seed, tell
+from pprs_dynamics.app.commands.arguments import UsageError, number, output_file, seed, show
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
             model, options.effect, seed=options.seed, motion=motion, duration=options.duration,
             path_seed=options.path_seed, progress=progress)
     result.save(options.output)
-    tell(result, options, screen, recording=options.output)
+    show(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}', soft_wrap=True)
     return 0
 

@@ -84,9 +84,9 @@ class GoalRelay:
                 raise ControllerError(f'nobody serves {self._name}: is the controller active?')
             watched.sent(self._node.get_clock().now().nanoseconds)
             sent = self._client.send_goal_async(goal, feedback_callback=watched.on_feedback)
-            if said := await self._lost(sent, watched):
+            if reason := await self._lost(sent, watched):
                 sent.add_done_callback(_cancel_late)
-                raise ControllerError(f'{said}; the goal was not accepted')
+                raise ControllerError(f'{reason}; the goal was not accepted')
             theirs = sent.result()
             if not theirs.accepted:
                 raise ControllerError('the controller rejected the goal; its log has the reason')
@@ -108,10 +108,10 @@ class GoalRelay:
         """
         try:
             answer = watched.theirs.get_result_async()
-            if said := await self._lost(answer, watched):
+            if reason := await self._lost(answer, watched):
                 watched.cancel()
-                raise ControllerError(f'{said} in the middle of a goal; what the drives do now is '
-                                      'not known', began=True)
+                raise ControllerError(f'{reason} in the middle of a goal; what the drives do now '
+                                      'is not known', began=True)
             return answer.result()
         finally:
             self._forget(watched)

@@ -64,10 +64,10 @@ class OwnerStatus(NamedTuple):
         ValueError, TypeError, LookupError, OverflowError
             Where it is no status of a node that drives: the topic belongs to nobody.
         """
-        said = json.loads(text)
-        model = said['model']
-        return cls(str(said['robot']), tuple(Path(each['file']).name for each in model['files']),
-                   str(model['sha256']), int(said['changes']))
+        content = json.loads(text)
+        model = content['model']
+        return cls(str(content['robot']), tuple(Path(each['file']).name for each in model['files']),
+                   str(model['sha256']), int(content['changes']))
 
 
 class ModelOwner:

@@ -381,10 +381,10 @@ class Api:
         """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
             yield b'data: 0\n\n'
-            told, due = 0, 0.0
+            version_sent, due = 0, 0.0
             while not self.hub.is_over:
-                if self.hub.version != told or time.monotonic() > due:
-                    told, due = self.hub.version, time.monotonic() + HEARTBEAT
-                    yield b'data: %d\n\n' % told
+                if self.hub.version != version_sent or time.monotonic() > due:
+                    version_sent, due = self.hub.version, time.monotonic() + HEARTBEAT
+                    yield b'data: %d\n\n' % version_sent
                 await asyncio.sleep(LOOK)
         return StreamingResponse(lines(), media_type='text/event-stream')
