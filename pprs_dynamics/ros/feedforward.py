@@ -261,7 +261,7 @@ class FeedforwardNode(ManagedNode):
                    f'range left, warning_margin is {node_values["warning_margin"]:g}')
         elif self._beyond_curve:
             report('WARN', 'CURVE', self._beyond_curve)
-        elif self._lagging:
+        elif self._status.content.lagging:
             report('WARN', 'LAG', 'the median wait of messages exceeds lag_warning, or most are '
                    'dropped: they arrive faster than the node answers, or the machine is busy')
         else:
@@ -386,13 +386,9 @@ class FeedforwardNode(ManagedNode):
 
     # --- status ---------------------------------------------------------------------------------
 
-    @property
-    def _lagging(self) -> bool:
-        return bool(self._status.content.lagging)
-
     def _refresh(self) -> None:
         """Update the content that is published once a second."""
-        if self._last_unchecked is not None and self._status.code == 'OK':
+        if self._last_unchecked is not None and self._status.content.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
             self._report_condition(self._last_unchecked)
         accepted, passed, now = (self._counters['accepted'], self._counters[PASSED_OVER],

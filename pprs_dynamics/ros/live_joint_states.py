@@ -41,7 +41,6 @@ from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_owner import ModelOwner
 from pprs_dynamics.ros.node.parameters import ACTIVE, overrides, plain_value
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, subscription
-from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
 COMPARED = 0.05  # [s] between looks at what came in
@@ -198,12 +197,10 @@ class LiveJointStates(Node):
                 'trouble': trouble, 'diagnosis': self._diagnosis,
                 'can_restore': self.owner.status.changes > 0,
                 'effects': list(self.model.values.get(ACTIVE, ())),
-                'error': [finite(value) for value in running],
-                'monitor_error': [finite(value) for value in self._monitor]
+                'error': running, 'monitor_error': self._monitor
                 if self._monitor is not None and now - self._heard < ERROR_SPAN else None,
                 'time': [moment for moment, _ in late[::step]],
-                'residual': [[finite(value) for value in column] for column in zip(
-                    *(values.tolist() for _, values in late[::step]), strict=True)]}
+                'residual': [*zip(*(values.tolist() for _, values in late[::step]), strict=True)]}
 
 
 class LiveNodes(LiveJointStates):

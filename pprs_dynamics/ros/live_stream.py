@@ -134,7 +134,11 @@ class LiveStream:
         """Return what became comparable since the last call; None: nothing did."""
         try:
             with self.lock:
-                compared = self._evaluated()
+                if self._begins_anew:
+                    self._cannot_begin = True
+                    self.comparison.use_model(self.model)
+                    self._begins_anew = self._cannot_begin = False
+                compared = self.comparison.evaluate()
         except PprsError as error:
             # An effect that failed may have left its memory half advanced.
             self._begins_anew |= isinstance(error, EffectError)
@@ -147,13 +151,6 @@ class LiveStream:
             self.counters['compared'] += len(compared.time)
             self._compared = self._clock()
         return compared
-
-    def _evaluated(self) -> Compared | None:
-        if self._begins_anew:
-            self._cannot_begin = True
-            self.comparison.use_model(self.model)
-            self._begins_anew = self._cannot_begin = False
-        return self.comparison.evaluate()
 
     def stamp_of(self, moment: float) -> int:
         """Return the stamp [ns] of a time of `Compared` [s]."""

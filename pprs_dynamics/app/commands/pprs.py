@@ -19,6 +19,7 @@ import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -164,10 +165,6 @@ class OneLineParser(argparse.ArgumentParser):
                                          f'{", ".join(known)}')
 
 
-def _formatter(prog: str) -> argparse.HelpFormatter:
-    return argparse.RawDescriptionHelpFormatter(prog, max_help_position=21)
-
-
 def _module(command: str) -> ModuleType:
     return import_module(f'{__package__}.{command.replace("-", "_")}')
 
@@ -184,7 +181,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     parser = OneLineParser(
         prog='pprs', description='Compare the dynamics of a robot with measurements, find the '
         'physical effect\nthat the model lacks, add it, and see the error fall.', epilog=EXAMPLES,
-        formatter_class=_formatter)
+        formatter_class=partial(argparse.RawDescriptionHelpFormatter, max_help_position=21))
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:

@@ -211,7 +211,9 @@ class Page:
         """Return the page."""
         library = ''
         if self._figures:
-            library = f'<script type="text/plain" id="plotly">{_packed(BASIC)}</script>'
+            packed = files('pprs_dynamics.app.report').joinpath(BASIC).read_bytes()
+            letters = base64.b64encode(packed).decode()
+            library = f'<script type="text/plain" id="plotly">{letters}</script>'
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
                 f'<title>{escape(self._title)}</title><style>{asset("page.css")}</style>'
@@ -245,12 +247,6 @@ def _bar(kind: str, share: float) -> str:
 
 def _force(value: float | None) -> str:
     return '' if value is None or value != value else plain(value)
-
-
-@cache
-def _packed(name: str) -> str:
-    """Return a compressed library of the package, in letters."""
-    return base64.b64encode(files('pprs_dynamics.app.report').joinpath(name).read_bytes()).decode()
 
 
 @cache

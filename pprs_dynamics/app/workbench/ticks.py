@@ -93,7 +93,8 @@ class Ticks:
             self.fits = fits
             self.revision += 1
             self.fitted_since = self.revision
-            self.view = view_state.without_ticks(fits, self.revision)
+            self.view = ViewState(self.revision, {}, fits.none, fits.none, fits.before, {},
+                                  view_state.FITTED)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):
                     self._tick(EffectRequest.named(

@@ -128,11 +128,6 @@ class ViewState:
             tick.effect.nonlinear for tick in self.ticks.values())
 
 
-def without_ticks(fits: TickFits, revision: int) -> ViewState:
-    """Return the view of a model without ticks."""
-    return ViewState(revision, {}, fits.none, fits.none, fits.before, {}, FITTED)
-
-
 def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision: int) -> ViewState:
     """Return what is shown of ticks at the noise of the state before, in milliseconds."""
     free = fits.at([tick.best for tick in ticks.values()], last.free)

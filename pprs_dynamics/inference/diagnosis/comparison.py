@@ -290,9 +290,9 @@ class Comparison(JsonRecord):
                 f'{kind if known else ""} ({worst.grade}).')
 
     @property
-    def overall(self) -> OverallError:
-        """Errors over all drives."""
-        return OverallError(self.rms, self.relative)
+    def overall(self) -> dict[str, float]:
+        """`rms` over all drives and samples [N], and `relative`: the same over the effort's."""
+        return {'rms': self.rms, 'relative': self.relative}
 
     @property
     def explained(self) -> dict[str, float]:
@@ -303,22 +303,6 @@ class Comparison(JsonRecord):
     def noise_floors(self) -> dict[str, float | None]:
         """Root mean square of the noise of each drive [N]; null where it is not known."""
         return {name: drive.noise_floor for name, drive in self.drives.items()}
-
-
-@dataclass(frozen=True)
-class OverallError(JsonRecord):
-    """Error over all drives.
-
-    Parameters
-    ----------
-    rms : float
-        Root mean square over drives and samples [N].
-    relative : float
-        The same over the effort's variation.
-    """
-
-    rms: float
-    relative: float
 
 
 def compare(residuals: Residuals, localisation: Localisation | None = None,

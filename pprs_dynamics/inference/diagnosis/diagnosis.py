@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isnan, nan
+from math import nan
 
 import numpy as np
 
@@ -91,8 +91,7 @@ class RankedSet(JsonRecord):
     def alone(self) -> EffectAlone:
         """The effect of a set of one effect."""
         (name, drives), = self.names
-        error = None if isnan(self.error_after) else self.error_after
-        return EffectAlone(name, drives, self.evidence, error)
+        return EffectAlone(name, drives, self.evidence, self.error_after)
 
 
 @dataclass(frozen=True)
@@ -111,14 +110,12 @@ class EffectAlone(NamedEffect):
     ----------
     evidence : float
         By how much the cost falls with it; 0 is the threshold.
-    error_after : float or None
-        Error with it [N].
+    error_after : float
+        Error with it [N]; null in `suspects`.
     """
 
-    json_keys = ('name', 'drives', 'evidence', 'error_after?')
-
     evidence: float
-    error_after: float | None = None
+    error_after: float
 
 
 @dataclass(frozen=True)
@@ -396,9 +393,9 @@ class Diagnosis(JsonRecord):
         return root_mean_square(sum((effect.force for effect in self.effects), self.remaining))
 
     @property
-    def refit_errors(self) -> ErrorFall:
-        """Error before and after a refit of the model's numbers, without the effects."""
-        return ErrorFall(root_mean_square(self.residuals.error), self.refit)
+    def refit_errors(self) -> dict[str, float]:
+        """`error_before` and `error_after` a refit of the model's numbers, without the effects."""
+        return {'error_before': root_mean_square(self.residuals.error), 'error_after': self.refit}
 
     @property
     def each_alone(self) -> tuple[EffectAlone, ...]:
@@ -429,14 +426,6 @@ class Diagnosis(JsonRecord):
     def changed_since(self) -> tuple[str, ...] | None:
         """Effects that have changed since the reference; null without one."""
         return None if self.since is None else tuple(effect.name for effect in self.effects)
-
-
-@dataclass(frozen=True)
-class ErrorFall(JsonRecord):
-    """Errors before and after a step [N]."""
-
-    error_before: float
-    error_after: float
 
 
 @dataclass(frozen=True)

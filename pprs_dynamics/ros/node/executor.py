@@ -88,7 +88,8 @@ class PromptExecutor(StoppableExecutor):
             for subscription in wait_set.ready('subscription', subscriptions):
                 self._take(subscription)
             for timer in timers:
-                self._fire(timer)
+                if call_if_due(timer):
+                    timer.callback()
             if others or time.monotonic() > rest_due:
                 rest_due = time.monotonic() + REST_PERIOD
                 self.spin_once(timeout_sec=0)
@@ -116,10 +117,6 @@ class PromptExecutor(StoppableExecutor):
             if taken is None:
                 return
             subscription.callback(*taken[:2 if wants_info else 1])
-
-    def _fire(self, timer: Timer) -> None:
-        if call_if_due(timer):
-            timer.callback()
 
 
 def _takes_two(callback: Callable[..., None]) -> bool:

@@ -23,30 +23,30 @@ OPTION = '--params-file'
 
 
 @dataclass(frozen=True)
-class ParameterFile(JsonRecord):
-    """Path and SHA-256 of a parameter file."""
-
-    file: str
-    sha256: str
-
-
-@dataclass(frozen=True)
 class Provenance(JsonRecord):
-    """Parameter files of a node, and the SHA-256 of the model that is in force."""
+    """Provenance of the model that is in force on a node.
 
-    files: tuple[ParameterFile, ...]
+    Parameters
+    ----------
+    files : list of dict
+        `file` and `sha256` of each parameter file.
+    sha256 : str
+        Of the model.
+    """
+
+    files: list[dict[str, str]]
     sha256: str
 
 
-def files_given(arguments: Sequence[str]) -> tuple[ParameterFile, ...]:
+def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
     """Return path and SHA-256 of the parameter files on a command line, in order.
 
     Without any it is the package's own model that a node runs.
     """
     paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
-    return tuple(ParameterFile(displayed(path.resolve()),
-                               hashlib.sha256(path.read_bytes()).hexdigest())
-                 for path in paths if path.is_file())
+    return [{'file': displayed(path.resolve()),
+             'sha256': hashlib.sha256(path.read_bytes()).hexdigest()}
+            for path in paths if path.is_file()]
 
 
 def hardware_of(model: DriveModel) -> str:

@@ -141,11 +141,6 @@ class StatusReporter:
         steady_timer(node, 1.0, self._tick)
         self._publish()
 
-    @property
-    def code(self) -> str:
-        """Code of the present condition."""
-        return self.content.code
-
     def report(self, level: Level, code: Code, message: str) -> None:
         """Take over a new condition; it goes out at once where the code changed."""
         content = self.content

@@ -45,6 +45,7 @@ from pprs_dynamics.app.workbench.ticks import SessionError, StaleError
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.json_records import for_json
 from pprs_dynamics.system.numbers import finite
 
 LARGEST = float_info.max  # whole numbers of JSON may be larger
@@ -349,7 +350,7 @@ class Api:
 
     def live(self, query: Any) -> Response:
         """Answer how live data stand."""
-        return JSONResponse(self._live.to_dict())
+        return JSONResponse(for_json(self._live.to_dict()))
 
     def live_set(self, body: Fields) -> Response:
         """Set the model with the ticked effects on the running nodes, all or none."""
