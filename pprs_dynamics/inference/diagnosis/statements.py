@@ -12,7 +12,13 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.inference.diagnosis.quantities import listed, plain, sentence, with_sign
+from pprs_dynamics.inference.diagnosis.quantities import (
+    listed,
+    percent,
+    plain,
+    sentence,
+    with_sign,
+)
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import DrivePatterns
@@ -159,7 +165,7 @@ def _sentence(
     kind, residuals = pattern.kind, drive_patterns.residuals
     units = residuals.units_of(residuals.drives[drive_patterns.d])
     effort, size = units.effort, plain(amplitude, SHOWN)
-    of = f'{share:.0%} of its squared error'
+    of = f'{percent(share)} of its squared error'
     if kind == 'offset':
         return f'its mean error is {with_sign(signed, SHOWN)} {effort} ({of})'
     if kind == 'friction':
@@ -179,7 +185,7 @@ def _sentence(
                 f'{with_sign(low, SHOWN)} {effort} at the lowest to {with_sign(high, SHOWN)} '
                 f'{effort} at the highest{opposed} ({of})')
     place = _place(variable, pattern, drive_patterns)
-    of += f' in {time:.0%} of the time'
+    of += f' in {percent(time)} of the time'
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
     return f'{place} its error is shifted by {with_sign(signed, SHOWN)} {effort}{along} ({of})'
 
