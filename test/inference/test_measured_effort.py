@@ -170,7 +170,7 @@ def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
     recording = Recording.from_arrays(
         'slow', slow.time, slow.position, slow.velocity,
         forces + np.random.default_rng(0).normal(0, 0.5, forces.shape), model.drives)
-    assert find_no_measurements(model, effort_contents(model, recording)) == ()
+    assert find_no_measurements(model, effort_contents(model, recording), True) == ()
 
 
 def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
@@ -243,5 +243,5 @@ CASES_OF = {
 def test_other_peoples_recordings(case: str) -> None:
     for recording, model, kinds in CASES_OF[case]:
         read = shared_case(case, model, recording)
-        found = find_no_measurements(read[0], effort_contents(*read))
+        found = find_no_measurements(read[0], effort_contents(*read), True)
         assert {finding.kind for finding in found} == kinds, recording

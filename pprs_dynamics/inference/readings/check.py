@@ -128,14 +128,16 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
             likely[0].reading.time_unit if likely else 1.0))
-    mistakes += find_shares(model)
+    if not search.has_gain:
+        mistakes += find_shares(model)
     evidence, excerpt = search.evidence(search.rows[0]), search.excerpts.get(1.0)
     if evidence is None or excerpt is None or any(
             isinstance(mistake, OtherReading) for mistake in mistakes):
         return tuple(mistakes)
     mistakes += find_unsigned(model, recording, excerpt, evidence)
     if not mistakes:
-        mistakes += find_no_measurements(model, effort_contents(model, recording, evidence))
+        mistakes += find_no_measurements(
+            model, effort_contents(model, recording, evidence), search.has_gain)
     return tuple(mistakes)
 
 
@@ -221,13 +223,15 @@ class Search:
         self.fits = [start]
         is_inside = not self._outside(first)
         # Without masses a gravity of any size may explain positions in another unit.
-        explains = is_inside and start.reading.is_plain and self.has_gain
-        if explains and self._explains(start):
-            return start
-        is_explained = explains and start.most_left < table.EXPLAINED and (
+        explains = is_inside and start.reading.is_plain and self.has_gain and (
             start.prior < self.plausible)
+        # Hardly anything may be explained better.
+        if explains and start.most_left < (
+                table.CLOSEST_FIT if self.is_first else table.CLOSE_FIT):
+            return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
-        tried = {'position_unit', 'drive_order'} if is_explained else {*table.COST}
+        tried = {'position_unit', 'drive_order'} if explains and (
+            start.most_left < table.EXPLAINED) else {*table.COST}
         seed = None
         while self._top() is not seed:
             seed = self._top()
@@ -259,17 +263,12 @@ class Search:
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""
-        if row.kind in ('position_offset', 'drive_order') and (
-                self._top().most_left < table.CLOSE_FIT):
-            return False
         if 'drive_order' in {row.kind, *before.kinds}:
             return not before.kinds
         return all(row.kind != part.kind or (row.kind == 'position_offset' and not (
             {*row.drives} & {*part.drives})) for part in before.parts)
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
-        if row.kind == 'load':
-            return fit.most_left < table.GOOD_FIT and fit.prior < table.PLAUSIBLE
         # Symmetric robots fit nearly as well in another order of their drives.
         return row.kind != 'drive_order' or fit.left < table.BETTER_ORDER * self.start.left
 
@@ -341,19 +340,12 @@ class Search:
                        for scale in scales)[1]
 
         first = fit_of(np.ones(len(weights)), 0.0)
-        if not reading.kinds and self._explains(first):
-            return first
         fits = [first, *(fit_of(*row) for row in self._effort_rows(
             reading, evidence, measured, alone))]
         if reading.kinds & {'position_offset', 'position_unit', 'mounting'}:
             # Another weight is credible only for efforts that show weight or inertia.
             fits = [fit for fit in fits if fit.mean_prior <= table.PLAUSIBLE]
         return max(fits, key=lambda fit: fit.score, default=None)
-
-    def _explains(self, fit: Fit) -> bool:
-        """Whether hardly anything may be explained better."""
-        close = table.CLOSEST_FIT if self.is_first else table.CLOSE_FIT
-        return fit.most_left < close and fit.prior < self.plausible
 
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
                      alone: Callable[[int, Sequence[float]], float],
@@ -387,8 +379,7 @@ class Search:
         kinds = [scales[[*family]] for family in table.families(self.model.drives)]
         yield scales, _cost(scales[measured]) if np.ptp(scales[measured]) == 0 else sum(
             _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds), ''
-        # Inertia alone may be invented: units that are no prefixes need a weight.
-        for scale in (scale for scale in units if evidence.has_weight or scale in table.OF_ONE):
+        for scale in units:
             if is_near(scale, measured):
                 recorded = evidence.total[drives, reading.efforts] > 0
                 yield np.where(recorded, scale, 1.0), _cost([scale]), ''

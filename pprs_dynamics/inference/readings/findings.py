@@ -320,7 +320,7 @@ def find_shares(model: DriveModel) -> Iterator[OtherReading]:
             f'{{{scalar(model.drives[group[0]])}: {{effort_scale: 0.3}}}}')
 
 
-def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
+def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares], has_gain: bool,
                          ) -> tuple[NoMeasurement, ...]:
     """Return what efforts look like that are no measurement, a finding for each kind.
 
@@ -329,6 +329,8 @@ def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
     model : DriveModel
     contents : mapping of str to Shares
         By drive; of a recording in the units and signs that it says.
+    has_gain : bool
+        Whether its efforts are forces.
     """
     if model.effort_kind in KINDS:
         kind, noun = KINDS[model.effort_kind]
@@ -342,7 +344,7 @@ def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
     moves = any(content.inertia_doubt < table.LEAST_SHARE and not content.lacks_inertia
                 for content in contents.values())
     # Forces of an unknown size cannot be compared with a model's.
-    weighs, moves = (each or not knows_forces(model) for each in (weighs, moves))
+    weighs, moves = weighs or not has_gain, moves or not has_gain
     excluded = ({table.WITHOUT_GRAVITY, table.EXTERNAL} if weighs else set()) | (
         {table.COMMAND, table.POSITION_ERROR, table.EXTERNAL} if moves else set())
     kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
@@ -354,7 +356,8 @@ def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, 
     """Return the finding for each drive whose effort is no measurement in one of the recordings."""
     found: dict[str, NoMeasurement] = {}
     for recording in recordings:
-        for finding in find_no_measurements(model, effort_contents(model, recording)):
+        for finding in find_no_measurements(
+                model, effort_contents(model, recording), knows_forces(model)):
             found = {**dict.fromkeys(finding.drives, finding), **found}
     return {drive: found[drive] for drive in model.drives if drive in found}
 

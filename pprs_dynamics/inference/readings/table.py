@@ -180,10 +180,8 @@ UNITS = {
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
-AS_WELL = 0.003  # difference of correlations that says nothing
 ROUGHER = 1.5  # third differences of what has noise, over those of what has none
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
-SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
 NO_EFFORT = 0.25  # residual of a column that is none, beside one with less
 LEAST_ROWS = 30
