@@ -105,6 +105,8 @@ def change(before: float, after: float, unit: str = 'N') -> str:
         return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
                 'after)')
     first, second = both_in_unit(before, after, unit)
+    if first == second:  # six digits do not show it
+        return f'falls from {in_unit(before, unit)} by less than 0.001%'
     return f'falls from {first} to {second}'
 
 
