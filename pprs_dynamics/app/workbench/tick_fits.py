@@ -262,4 +262,7 @@ class TickFits:
             fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
-        return model, self.measured - fits.design.exact_forces(model), parameters
+        # The fitted delay, not the apparent one, says which efforts are of motion before a segment.
+        residual = (measure_residuals(model, self.recordings)[0].error if self.since is None
+                    else self.measured - fits.design.exact_forces(model))
+        return model, residual, parameters
