@@ -40,7 +40,6 @@ def test_mutants_have_tests_that_there_are() -> None:
                for entry in listed.values() for name in entry['tests'])
 
 
-@pytest.mark.slow
 def test_mutants_are_mistakes_in_code_that_there_is() -> None:
     assert mutants.stale() == []
 

@@ -389,4 +389,3 @@ def _orders(count: int) -> list[tuple[int, ...]]:
           for rows in range(2, count) if not count % rows)}
     return sorted(found - {same}, key=lambda order: (
         sum(k != place for place, k in enumerate(order)), order))
-

@@ -156,8 +156,7 @@ class Effect(ABC):
         """
 
     def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
-        """Return the measured effort where the drives apply `effort`, (N, D), if it is a sensor's.
-        """
+        """Return what the sensors measure where the drives apply `effort`, (N, D)."""
         return effort + self.force(state, memory)
 
     def initial_memory(self, start: float | None = None) -> Any:

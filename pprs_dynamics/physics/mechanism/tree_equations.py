@@ -901,9 +901,8 @@ def joint_friction(t: Model, m: Data, o: Loads, rubbing: Any) -> None:
 
 
 def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
-              given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              actuators: Any, closed: Any, efforts: Any, stages: int,
-              nearby: bool) -> int:
+             given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
+             actuators: Any, closed: Any, efforts: Any, stages: int, nearby: bool) -> int:
     """Evaluate the stages at each sample in turn; see `Evaluation`.
 
     Return the first sample that fails, or -1.
@@ -955,7 +954,7 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
 
 
 def oppose_friction(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
-         rubbing: Any, of_tree: Any, efforts: Any) -> None:
+                    rubbing: Any, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts (N, D) against friction of joints under their loads."""
     t = elements(read_tables(sizes, integers, reals))
     for s in range(len(efforts)):

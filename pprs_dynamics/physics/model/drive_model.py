@@ -197,7 +197,7 @@ class DriveModel:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
         structure = self.robot.structure
         return (() if structure is None or self.values.get('links.inertia')
-                                   else structure.description.faults)
+                else structure.description.faults)
 
     @property
     def efforts_in_amperes(self) -> bool:

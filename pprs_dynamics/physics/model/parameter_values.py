@@ -34,8 +34,9 @@ from pprs_dynamics.physics.model.keys import (
 
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
-REFERENCE_KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
-        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
+REFERENCE_KEYS = {
+    REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
+    HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
 UNCERTAINTIES = 'uncertainties'
 # Keys of the block `effects` that are no effect.
 ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)

@@ -64,8 +64,7 @@ class JointSpring(BodyEffect):
 
     @classmethod
     def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
-        """Return the parameters of a joint, that turns or slides; the first of alike ones is tried.
-        """
+        """Return the parameters of a joint; of alike joints the first is tried."""
         joint, turns = place
         units = DriveUnits(turns)
         stiffness = Parameter(f'{joint}.stiffness', 'k', units.of('N/m'), f'stiffness in {joint}',
