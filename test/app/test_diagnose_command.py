@@ -26,7 +26,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_axis(folder / 'run.csv', 1)
     write_axis(folder / '<b>other<b>.mcap', 2)
     done = pprs('diagnose', 'run.csv', '--validate', '<b>other<b>.mcap', '--model', AXIS, '--json',
-                'result.json', '--report', 'page.html', cwd=folder)
+                'result.json', '--report', 'page.html', '--adopt-all', '--output', 'better.yaml',
+                cwd=folder)
     assert done.returncode == 0, done.stderr
     (folder / 'stdout.txt').write_text(done.stdout)
     return folder
@@ -40,8 +41,8 @@ def result(folder: Path) -> dict[str, Any]:
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'above_noise', 'barred', 'calibrated', 'detectable', 'effort_looks_like', 'explained',
-             'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
+    added = {'above_noise', 'adoption', 'barred', 'calibrated', 'detectable', 'effort_looks_like',
+             'explained', 'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
              'noise_floors', 'reference', 'refit', 'changed_since', 'sets', 'stick_slip',
              'unconfirmed', 'warnings'}
     assert set(result) == promised | added
@@ -60,13 +61,21 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     assert all(isinstance(warning, str) for warning in result['warnings'])
 
 
+def test_the_model_that_is_written_has_the_effect(folder: Path, result: dict[str, Any]) -> None:
+    written = DriveModel.load(folder / 'better.yaml').values
+    assert list(written['effects.active']) == ['coulomb_friction']
+    found, = result['effects']
+    assert written['effects.coulomb_friction.axis.force'] == pytest.approx(
+        found['parameters']['axis.force']['value'], rel=0.02)
+
+
 def test_the_page_is_a_record_that_can_be_filed(folder: Path) -> None:
     page = html.unescape((folder / 'page.html').read_text())
     for name in ('run.csv', '<b>other<b>.mcap'):
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in page
     assert DriveModel.load(AXIS).fingerprint in page
     assert (f"pprs diagnose run.csv --validate '<b>other<b>.mcap' --model {AXIS} --json "
-            'result.json --report page.html') in page
+            'result.json --report page.html --adopt-all --output better.yaml') in page
     assert '1600 samples, 8.00 s at 200 Hz' in page
     assert f'pprs_dynamics {__version__}' in page
     assert datetime.now(UTC).date().isoformat()[:7] in page

@@ -184,19 +184,6 @@ def test_the_penalty_of_a_sign_is_the_integral_over_its_prior() -> None:
         assert COSTS.of_sign(deviations) == pytest.approx(-2 * np.log(integral), abs=1e-6)
 
 
-def test_the_penalty_of_a_sign_has_no_step() -> None:
-    steps = np.diff([COSTS.of_sign(z) for z in np.linspace(-6, 6, 1201)])
-    assert np.all(steps < 0)
-    assert np.all(steps > -0.05)
-
-
-def test_only_a_wrong_sign_in_doubt_is_cheap() -> None:
-    """Far on one side the penalty is that of the prior probability of that side."""
-    odds = [np.exp(-COSTS.of_sign(z) / 2) / 2 for z in (40.0, -40.0)]
-    assert odds[1] == pytest.approx(DECISIONS.wrong_sign_odds)
-    assert sum(odds) == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize('effect', SIGNED, ids=lambda case: case.name)
 def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> None:
     names = tuple(c.name for c in effect.coefficients)

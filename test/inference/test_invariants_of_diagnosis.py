@@ -19,15 +19,14 @@ from pprs_dynamics import DriveModel, JointMotion, compare
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.adoption.adopt import adopt_all
 from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
-from pprs_dynamics.inference.diagnosis.answer import Answer, rival_effects
+from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.table import ModelTable, Row
+from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.ledger import read_steps
 
@@ -106,18 +105,6 @@ def test_reported_effects_lower_the_error_held_out_too(name: str) -> None:
         rms(measure_residuals(found.adopted, [run])[0]), rel=1e-3)
     assert other.effects[0].held_out_after == pytest.approx(
         rms(measure_residuals(other.adopted, [recorded(name, 2)])[0]), rel=1e-3)
-
-
-def test_where_the_error_is_above_the_noise_nothing_is_advised_for_adoption() -> None:
-    table = table_of(diagnosed('two', 1))
-    fits, fitted = table.best.fits, table.best.fitted
-    friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
-    row = Row(fits, fits.evaluate(fitted.without(friction)), 0.0)
-    found = Answer(table, row, ()).diagnosis()
-    assert [effect.name for effect in found.effects] == ['drive_inertia']
-    assert found.above_noise[AXIS] > 0.9 * np.std(found.remaining) / NOISE > 5
-    assert found.verdict == 'unknown'
-    assert next_step(found, GivenFiles(('run.csv',)))[1].startswith('pprs diagnose run.csv')
 
 
 @pytest.mark.parametrize('name', HIDDEN)
@@ -364,16 +351,6 @@ def test_a_force_of_no_catalogue_is_unknown_with_its_place() -> None:
     assert (first.drive, first.variable) == (AXIS, 'position')
     assert first.range == pytest.approx((0.01, 0.03), abs=0.006)
     assert dict(found.above_noise) == {}  # too small to be seen in the residual of the whole
-
-
-def test_an_effect_of_the_model_with_another_value_is_reported_with_both() -> None:
-    wrong = {'drive_spring': {'stiffness': 100.0, 'position': 0.02}}
-    found = diagnose(axis(wrong), [recorded('spring', 1)])
-    (effect,) = found.effects
-    assert effect.in_model == {f'{AXIS}.stiffness': 100.0, f'{AXIS}.position': 0.02}
-    assert abs(effect.parameters[f'{AXIS}.stiffness'].value - 60.0) < 4 * effect.parameters[
-        f'{AXIS}.stiffness'].std
-    assert diagnosed('spring', 1).effects[0].in_model == {}
 
 
 def test_what_drifts_is_unknown_and_reported_as_drifting() -> None:

@@ -118,14 +118,3 @@ def test_an_effect_within_the_form_error_of_others_makes_no_other_effect(
     found = set(names(table.best.fitted))
     assert 'drive_inertia' in found
     assert found <= {'drive_inertia', 'viscous_friction', 'coulomb_friction', *effects}
-
-
-def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
-    recording = recording_of({}, 0.05)
-    effort = recording.effort.copy()
-    effort[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * TIME)
-    made = Recording.from_arrays('made', TIME, recording.position, effort=effort)
-    found = tabulate(MODEL, [made], DECISIONS).best.fitted
-    assert not found.effects
-    assert [c.drives for c in found.unknowns] == [(3,)]
-    assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)

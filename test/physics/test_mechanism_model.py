@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from pathlib import Path
@@ -15,12 +14,10 @@ import mujoco
 import numpy as np
 import pytest
 import yaml
-from pprs_command import pprs
-from single_axis import AXIS, TIME, axis, axis_motion, axis_recording
+from single_axis import TIME, axis, axis_motion
 
 from pprs_dynamics import DriveModel, JointMotion, PprsError
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -160,20 +157,7 @@ def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
 # A single axis: its forces, its files, and the same commands on recordings of one drive.
 
 VALUES = dict(axis().values)
-SPRING = 55.0  # [N/m]: hidden
-NOISE = 0.05  # [N]
 EQUAL = 1e-12
-
-
-@pytest.fixture(scope='module')
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a model file and two recordings of an axis with a hidden spring."""
-    folder = tmp_path_factory.mktemp('axis')
-    write_model(folder / 'axis.yaml', VALUES)
-    worn = axis({'drive_spring': {'stiffness': SPRING, 'position': 0.03}})
-    for seed, name in enumerate(('run.csv', 'other.mcap')):
-        write_recording(folder / name, axis_recording(worn, seed, NOISE))
-    return folder
 
 
 @pytest.mark.parametrize('gravity', [0.0, -9.81])
@@ -196,24 +180,3 @@ def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence:
     with pytest.raises(ModelError) as caught:
         DriveModel.from_parameters({**VALUES, **change})
     assert sentence in str(caught.value)
-
-
-def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder: Path) -> None:
-    done = pprs('diagnose', 'run.csv', '--validate', 'other.mcap', '--model', 'axis.yaml',
-                '--adopt-all', '--output', 'better.yaml', '--json', 'result.json', cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found = json.loads((folder / 'result.json').read_text())
-    assert [effect['name'] for effect in found['effects']] == ['drive_spring']
-    assert found['effects'][0]['drives'] == [AXIS]
-    values = found['effects'][0]['parameters']
-    stiffness = values['axis.stiffness']
-    assert abs(stiffness['value'] - SPRING) < 4 * stiffness['std'] + 0.01 * SPRING
-    better = DriveModel.load(folder / 'better.yaml')
-    assert better.kind == 'slide'
-    assert better.values['effects.active'] == ('drive_spring',) or better.values[
-        'effects.active'] == ['drive_spring']
-    after = pprs('compare', 'other.mcap', '--model', 'better.yaml', '--json', 'after.json',
-                 cwd=folder)
-    assert after.returncode == 0, after.stderr
-    floor = NOISE / np.sqrt(2)  # means over 10 ms of white noise
-    assert json.loads((folder / 'after.json').read_text())['overall']['rms'] < 1.3 * floor

@@ -24,7 +24,6 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
-from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 
 pytestmark = pytest.mark.nodes
@@ -154,36 +153,6 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
 # The nodes with a robot with loops: trajectories of its drives or of its tool in, efforts out.
 
 HEXAPOD = 'config/hexapod.yaml'
-
-
-@pytest.fixture
-def hexapod() -> Iterator[FeedforwardBench]:
-    with feedforward_bench(JointTrajectory, **parameters(find_file(HEXAPOD))) as running:
-        yield running
-
-
-def drives_message(model: DriveModel, position: np.ndarray) -> JointTrajectory:
-    zero = np.zeros(len(position)).tolist()
-    return JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
-        positions=position.tolist(), velocities=zero, accelerations=zero,
-        time_from_start=Duration())])
-
-
-def test_efforts_are_the_models_and_what_cannot_be_is_refused(hexapod: FeedforwardBench) -> None:
-    model = DriveModel.load(HEXAPOD)
-    home = model.robot.structure.home[model.robot.structure.tables.drives]
-    near = home + 0.01 * np.arange(6)
-    rest = np.zeros((1, 6))
-    expected = model.drive_forces(JointMotion(near[None], rest, rest, np.zeros(1))).total[0]
-    np.testing.assert_allclose(hexapod.answer(drives_message(model, near)), expected, rtol=0,
-                               atol=EQUAL)
-    # Within every leg's stroke, and beyond what six legs can reach together.
-    far = np.array([0.41, 0.655, 0.41, 0.655, 0.41, 0.655])
-    with pytest.raises(WorkspaceError):
-        model.drive_forces(JointMotion(far[None], rest, rest, np.zeros(1)))
-    hexapod.send(drives_message(model, far))
-    hexapod.wait_for_status(code='WORKSPACE')
-    assert hexapod.counters['WORKSPACE'] == 1
 
 
 def poses(rng: np.random.Generator, points: int = 1) -> PlatformMotion:

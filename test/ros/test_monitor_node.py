@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from pprs_dynamics import DriveModel
@@ -28,9 +28,8 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.node.qos import LATCHED, subscription
+from pprs_dynamics.ros.node.qos import LATCHED
 
 pytestmark = pytest.mark.nodes
 
@@ -215,20 +214,6 @@ def test_a_status_of_another_program_does_not_end_the_monitor() -> None:
         assert running.spin_until(monitor._owner.difference)
         assert monitor._owner.status.files == ('robot.yaml',)
         assert monitor._owner.status.fingerprint != DriveModel.load().fingerprint
-
-
-def test_bytes_that_are_no_message_are_dropped() -> None:
-    with bench() as running:
-        received: list[list[float]] = []
-        subscription(running.probe, Float64MultiArray, '/numbers', only_whole(
-            Float64MultiArray, lambda message: received.append(list(message.data))))
-        publisher = running.probe.create_publisher(Float64MultiArray, '/numbers', 10)
-        assert running.spin_until(publisher.get_subscription_count)
-        whole = bytes(serialize_message(Float64MultiArray(data=[1.0, 2.0])))
-        for data in (whole[:-8], b'\0\1\0\0', whole[:9] + b'\xff' * 4 + whole[13:], whole):
-            publisher.publish(data)
-        assert running.spin_until(lambda: received)
-        assert received == [[1.0, 2.0]]
 
 
 # The monitor says what changed on the running robot, over topics, and it is adopted.

@@ -20,7 +20,6 @@ from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.mechanism.state import StructureLoad
 from pprs_dynamics.simulation.engine import MechanismEngine
@@ -56,16 +55,6 @@ def test_the_engine_moves_the_bodies_of_the_model(model: DriveModel) -> None:
     assert engine.torques(motion) == pytest.approx(
         model.drive_forces(motion).parts['rigid_body']
         - np.array(model.values['robot.armature']) * motion.acceleration, abs=1e-8)
-
-
-def test_a_hidden_payload_is_a_point_at_the_tool(model: DriveModel) -> None:
-    motion = draw_motion(model, 10.0, 1)
-    engine = MechanismEngine(model)
-    before = engine.torques(motion)
-    engine.carry(model.robot.structure.tool, body_at(1.5, (0.0, 0.0, 0.0), np.zeros((3, 3))))
-    loaded = with_effects(model, {'payload_mass': {'mass': 1.5}})
-    assert engine.torques(motion) - before == pytest.approx(
-        loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
 
 
 @pytest.mark.parametrize('of', ['arm', 'hexapod'])
