@@ -354,8 +354,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
     if len(series) == count and not count % 2:
         half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]
         raise AmbiguousColumns(
-            joints, [read(layout.blocks), stamp | dict(zip(half, (each.column for each in series),
-                                                    strict=True))],
+            joints, [read(layout.blocks), stamp | dict(zip(
+                half, (each.column for each in series), strict=True))],
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
     used = [place for block in layout.blocks.values() for place in block]
