@@ -101,7 +101,7 @@ class LiveJointStates(Node):
         parts = [f'node {full_name}']
         if status.robot:
             parts.append(f'robot {status.robot}'
-                        + (f' of {", ".join(status.files)}' if status.files else ''))
+                         + (f' of {", ".join(status.files)}' if status.files else ''))
         if takers := self._takers(full_name):
             parts.append(f'commands go to {", ".join(takers)}')
         return '; '.join(parts)

@@ -509,6 +509,7 @@ class AdoptionRun(JsonRecord):
         """The steps that were taken."""
         return tuple(step for step in self.steps if step.adopted)
 
+
 def adopt_all(
     model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     record: Callable[[Adoption], DriveModel] = lambda adoption: adoption.after,

@@ -282,6 +282,7 @@ class SinceReference(JsonRecord):
         pace = float(np.median(here[moved] / there[moved])) if moved.any() else 1.0
         return cls(reference.names, design.carried.covered, explained, pace, reference.note)
 
+
 @dataclass(frozen=True)
 class Diagnosis(JsonRecord):
     """The answer.

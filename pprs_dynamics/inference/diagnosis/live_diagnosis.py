@@ -77,6 +77,7 @@ class LiveEffect(JsonRecord):
         what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
         return f'{what}: {values}, {since}'
 
+
 @dataclass(frozen=True)
 class Window:
     """Diagnosis of one window of the stream, with the fitted models.

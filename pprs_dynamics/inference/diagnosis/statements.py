@@ -107,6 +107,7 @@ class Statement(JsonRecord):
         """Whether `range` is one of the speed, in either direction."""
         return is_of_speed(self.kind, self.variable)
 
+
 def word_statement(
     drive_patterns: DrivePatterns, candidate: UnknownCandidate, coefficients: Array,
     evidence: float, other_variables: tuple[str, ...] = (),

@@ -84,6 +84,7 @@ class CostTerms(JsonRecord):
     def __sub__(self, other: CostTerms) -> CostTerms:
         return CostTerms(*map(sub, vars(self).values(), vars(other).values()))
 
+
 @dataclass(frozen=True)
 class Course:
     """When an effect is there, of the time of all recordings together [s].

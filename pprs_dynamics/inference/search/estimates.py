@@ -43,6 +43,7 @@ class Estimate(JsonRecord):
     std: float
     unit: str
 
+
 @dataclass(frozen=True)
 class Calibration(JsonRecord, Number):
     """A number of the model that was moved within its tolerance.
