@@ -271,13 +271,13 @@ class Answer:
         return self.fits.evaluate(self.fitted.without(candidate)).total - self.fitted.total
 
     def _depends_on(self) -> tuple[Statement, ...]:
-        """Return patterns of no catalogue."""
+        """Return patterns of no catalogue, that of the largest share of its drive's error first."""
         by_drive = {pattern.d: pattern for pattern in self.table.patterns}
         statements = [
             word_statement(by_drive[d], candidate, self.fitted.fit.of(block),
                            self._evidence(candidate))
             for candidate in self.fitted.unknowns for d, block in candidate.parts.items()]
-        return tuple(sorted(statements, key=lambda statement: -statement.evidence))
+        return tuple(sorted(statements, key=lambda statement: -statement.share_of_error))
 
     # Queries on the table
 
