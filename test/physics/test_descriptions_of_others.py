@@ -162,7 +162,7 @@ def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
     expected = rnea(tmp_path, [np.cos(q[0]), np.sin(q[0])], v, a)
     assert efforts(model, q, v, a)[0] == pytest.approx(expected, rel=1e-9)
     structure = model.robot.structure
-    assert structure.turning == ('j1',)
+    assert model.robot.turning == ('j1',)
     assert (structure.lower[0], structure.upper[0]) == (-np.inf, np.inf)
     assert (structure.effort[0], structure.speed[0]) == (39, 2)
 
