@@ -18,7 +18,7 @@ from pprs_dynamics.inference.regression.constrained import (
 )
 from pprs_dynamics.inference.search.body_centres import REACH
 from pprs_dynamics.inference.search.candidates import Component
-from pprs_dynamics.inference.search.constraints import body_planes
+from pprs_dynamics.inference.search.constraints import DOUBTED, body_planes
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.description import pseudo_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -99,11 +99,14 @@ def payload(robot: Mechanism, variant: int) -> Component:
 
 def nearest_body(robot: Mechanism, component: Component, c: Array, covariance: Array,
                  ) -> tuple[Array, float]:
-    """Return the nearest body that can be, and its rise."""
-    found = nearest(c, covariance, Inequalities.none(len(c)),
-                    body_planes(robot, component, 1.0 if c[0] >= 0 else -1.0))
-    assert found is not None
-    return found.coefficients, found.rise
+    """Return the nearest body that can be, of either sign where that is in doubt, and its rise."""
+    sign = 1.0 if c[0] >= 0 else -1.0
+    doubted = abs(c[0]) < DOUBTED * covariance[0, 0] ** 0.5
+    found = [nearest(c, covariance, Inequalities.none(len(c)),
+                     body_planes(robot, component, side))
+             for side in ((sign, -sign) if doubted else (sign,))]
+    best = min((n for n in found if n is not None), key=lambda n: n.rise)
+    return best.coefficients, best.rise
 
 
 def least_extents(robot: Mechanism, component: Component, c: Array) -> tuple[float, float]:

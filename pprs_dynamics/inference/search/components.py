@@ -233,13 +233,18 @@ class Components:
     @cached_property
     def score_test(self) -> ScoreTest[Component]:
         """All that more than one drive feels; computed when asked for."""
-        shared = [*self.structure, *self.spanning]
-        blocks = [self.block(component) for component in shared]
-        ends = np.cumsum([block.size for block in blocks]).tolist()
-        rows = self.regression.joined(blocks).rows
-        return ScoreTest(self.regression, {d: of.astype(np.float32) for d, of in rows.items()}, [
-            Entry(component, tuple(range(end - block.size, end)), block.precision, block.mean)
-            for component, block, end in zip(shared, blocks, ends, strict=True)])
+        series = self.regression.series
+        entries, parts, first = [], [], 0
+        for component in (*self.structure, *self.spanning):
+            block = self.block(component)
+            entries.append(Entry(component, tuple(range(first, first + block.size)),
+                                 block.precision, block.mean))
+            parts.append({d: block.rows[d] if d in block.rows
+                          else np.zeros((block.size, len(series[d]))) for d in series})
+            first += block.size
+        return ScoreTest(self.regression, {
+            d: np.concatenate([part[d] for part in parts]).astype(np.float32) for d in series},
+            entries)
 
     def shared_offers(self, fit: JointFit) -> list[tuple[Component, float]]:
         """Return what more than one drive feels, with its gains at the noise of a fit."""
@@ -336,6 +341,15 @@ class Components:
         """Return the values of a shape parameter that are tried, in order."""
         return sorted({trial[name] for trial in self.trials(component)})
 
+    def unloaded(self, component: Component) -> dict[int, Array] | None:
+        """Return what its columns change by if friction did not follow its loads, (k, n)."""
+        term = self.term(component)
+        if term.bare is None:
+            return None
+        chosen = [term.names.index(name) for name in component.names]
+        return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
+                for d, values in term.bare.items() if d in self.regression.series}
+
     def nuisance_rows(self, component: Component) -> Mapping[str, dict[int, Array]]:
         """Return the uncertainty of its form by kind and drive, (k, w, n) for k coefficients.
 
@@ -355,6 +369,10 @@ class Components:
                     for d, values in rows.items()
                     if np.any(values) and d in self.regression.series})}
         return self._nuisance[component]
+
+    def leaves_open(self, component: Component) -> bool:
+        """Return whether there are columns for the uncertainty of a component's form."""
+        return self.term(component).bare is not None or bool(self.nuisance_rows(component))
 
     def prior_cost(self, candidate: Candidate) -> CostTerms:
         """Return the prior cost of everything that was chosen."""

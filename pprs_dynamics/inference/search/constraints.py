@@ -20,6 +20,7 @@ inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018)
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,6 +73,7 @@ MARGIN, ROUNDING = 1e-4, 1e-9
 NEAR = 0.3  # radius of gyration of a small body, of the distance between joints
 THIN = 1e-6  # of a link's largest second moment, which its least is taken to have
 LEAST_MASS = 1e-6  # [kg] of a body
+DOUBTED = 2.0  # standard deviations of a mass within which it may be added or taken away
 
 
 class Constraints:
@@ -138,21 +140,37 @@ class Constraints:
 
     def _nearest(self, places: Mapping[Component, slice], mean: Array, covariance: Array,
                  ) -> Constrained | None:
-        """Return the nearest possible coefficients, of bodies with the sign of their mass."""
-        sets = [(place, _given(component), self._planes_of(
-            component, 1.0 if mean[place.start] + _given(component)[0] >= 0 else -1.0))
-            for component, place in places.items()
-            if issubclass(component.effect, AddedBody) and component.effect.has_extent]
+        """Return the nearest possible coefficients, for each sign that a doubtful mass may have."""
+        linear = self._linear(places, len(mean))
+        bodies = [component for component in places if issubclass(component.effect, AddedBody)
+                  and component.effect.has_extent]
+        signs = []
+        for component in bodies:
+            at = places[component].start
+            mass = mean[at] + _given(component)[0]
+            sign = 1.0 if mass >= 0 else -1.0
+            doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
+            signs.append((sign, -sign) if doubted else (sign,))
+        best: Constrained | None = None
+        for choice in product(*signs):
+            sets = [(places[component], _given(component), self._planes_of(component, sign))
+                    for component, sign in zip(bodies, choice, strict=True)]
 
-        def planes(c: Array) -> Inequalities:
-            found = Inequalities.none(len(c))
-            for place, given, of_body in sets:
-                more = of_body(c[place] + given)
-                A = np.zeros((len(more.b), len(c)))
-                A[:, place] = more.A
-                found = found.and_also(Inequalities(A, more.b - more.A @ given))
-            return found
-        return nearest(mean, covariance, self._linear(places, len(mean)), planes)
+            def planes(c: Array, sets: list[tuple[slice, Array, BodyPlanes]] = sets,
+                       ) -> Inequalities:
+                found = Inequalities.none(len(c))
+                for place, given, of_body in sets:
+                    more = of_body(c[place] + given)
+                    A = np.zeros((len(more.b), len(c)))
+                    A[:, place] = more.A
+                    found = found.and_also(Inequalities(A, more.b - more.A @ given))
+                return found
+            found = nearest(mean, covariance, linear, planes)
+            if found is not None and (best is None or found.rise < best.rise):
+                best = found
+            if best is not None and best.rise == 0:
+                break
+        return best
 
     def _planes_of(self, component: Component, sign: float) -> BodyPlanes:
         key = (component, sign)
