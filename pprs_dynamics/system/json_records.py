@@ -55,6 +55,8 @@ def for_json(content: Any) -> Any:
 
     Of what has a method `to_dict` the result of that.
     """
+    if isinstance(content, JsonRecord):
+        return content.to_dict()
     if hasattr(content, 'to_dict'):
         return for_json(content.to_dict())
     if isinstance(content, Mapping):

@@ -87,7 +87,8 @@ class AdoptionResult(Result):
         The answer with all that it was decided from.
     """
 
-    rows, json_keys = 'parameters', ('**adoption',)  # `rows` is what `table` shows
+    rows = 'parameters'  # what `table` shows
+    json_keys = ('**adoption',)
     inputs: Inputs
     adoption: Adoption
 
@@ -220,7 +221,8 @@ class AdoptionRunResult(Result):
         What was adopted and refused, one after the other.
     """
 
-    rows, json_keys = 'steps', ('**run',)  # `rows` is what `table` shows
+    rows = 'steps'  # what `table` shows
+    json_keys = ('**run',)
     inputs: Inputs
     run: AdoptionRun
 

@@ -48,7 +48,8 @@ class FitResult(Result):
         The numbers, and the errors before, after and held out.
     """
 
-    rows, json_keys = 'numbers', ('**fit',)  # `rows` is what `table` shows
+    rows = 'numbers'  # what `table` shows
+    json_keys = ('**fit',)
     inputs: Inputs
     fit: BaseFit
 

@@ -405,7 +405,7 @@ class Diagnosis(JsonRecord):
 
     @property
     def each_suspect(self) -> tuple[EffectAlone, ...]:
-        """Effects that slow noise would explain as well."""
+        """Effects that nearly pay their prior cost in addition to the reported ones."""
         return tuple(ranked.alone for ranked in self.suspects)
 
     @property
