@@ -76,9 +76,9 @@ def test_what_is_hidden_is_reported_with_its_values_and_nothing_else(name: str) 
     assert possible(found) >= set(HIDDEN[name])
     assert len(found.effects) == len(HIDDEN[name])
     # What lowers the error most comes first, of the reported effects and of those tried alone.
-    shares, evidence = ([effect.share for effect in found.effects],
+    errors, evidence = ([effect.error_before for effect in found.effects],
                         [candidate.evidence for candidate in found.candidates])
-    assert shares == sorted(shares, reverse=True)
+    assert errors == sorted(errors, reverse=True)
     assert evidence == sorted(evidence, reverse=True)
     for effect in found.effects:
         assert effect.course is None

@@ -56,7 +56,7 @@ def found_effect(name: str, drives: tuple[str, ...] | None = ('lift_2',), value:
         if drives is None or DRIVES[d] in drives:
             force[:, d] = value * np.sign(velocity[:, d])
     values = {'parameters': parameters, 'evidence': 120.4, 'error_before': 0.25,
-              'error_after': 0.0510, 'held_out_before': 0.26, 'share': 0.796, **changes}
+              'error_after': 0.0510, 'held_out_before': 0.26, **changes}
     return FoundEffect(effect, drives, force=force, held_out_after=held_out_after, **values)
 
 

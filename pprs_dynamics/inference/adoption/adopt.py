@@ -11,7 +11,7 @@ several effects in the values that they have together, that error may fall with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from pprs_dynamics.inference.adoption.fit_curve import (
     held_out_residuals,
     with_curve,
     without_curve,
+    without_effect,
 )
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.diagnosis.answer import Answer
@@ -379,19 +380,8 @@ def requested_model(answer: Answer, effects: Sequence[FoundEffect],
             if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
     for effect in effects:
         gone = _gone(answer, effect)
-        values = _without(values, effect.name, gone)
+        values = without_effect(values, effect.name, gone)
     return replace(DriveModel.from_parameters(values), source=model.source), gone
-
-
-def _without(values: Mapping[str, Any], name: str, places: Sequence[str]) -> dict[str, Any]:
-    """Return the values of a model without an effect in some places, as the beginnings of keys."""
-    removed = tuple(f'{block}.{name}.{place}' for block in ('effects', UNCERTAINTIES)
-                    for place in places)
-    found = {key: value for key, value in values.items()
-             if not (removed and key.startswith(removed))}
-    if not any(key.startswith(f'effects.{name}.') for key in found):
-        found['effects.active'] = [other for other in found['effects.active'] if other != name]
-    return found
 
 
 @outside_cost('adopt removes an effect of the model of which the recordings show none')
@@ -412,7 +402,8 @@ def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
         inner = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
         place = (f'{design.drives[component.drive]}.' if component.drive is not None
                  else ''.join(f'{each}.' for each in inner))
-        less = DriveModel.from_parameters(_without(answer.adopted.values, effect.name, [place]))
+        less = DriveModel.from_parameters(
+            without_effect(answer.adopted.values, effect.name, [place]))
         less_force = design.exact_forces(answer.adopted) - design.exact_forces(less)
         without = replace(with_it, measured=answer.remaining + less_force)
         if not predictive_gain(without, with_it).confirms(SURE):

@@ -10,7 +10,7 @@ likelihood. The same number, against that without a curve, is the evidence.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -26,6 +26,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsErro
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, Curve, MeasuredCurve, spline_basis
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
 INTERVALS = 96  # between knots; the prior on the roughness decides how fine the curve is
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
@@ -175,14 +176,19 @@ def with_curve(model: DriveModel, drive: str, fitted: FittedCurve) -> DriveModel
 
 def without_curve(model: DriveModel, drive: str) -> DriveModel:
     """Return a model without a drive's curve: itself, where there is none."""
-    prefix = f'effects.{MeasuredCurve.name}.'
-    if not any(key.startswith(f'{prefix}{drive}.') for key in model.values):
+    if not any(key.startswith(f'effects.{MeasuredCurve.name}.{drive}.') for key in model.values):
         return model
-    values = {key: value for key, value in model.values.items()
-              if not key.startswith(f'{prefix}{drive}.')}
-    if not any(key.startswith(prefix) for key in values):
-        values[ACTIVE] = [name for name in values[ACTIVE] if name != MeasuredCurve.name]
-    return _built(model, values)
+    return _built(model, without_effect(model.values, MeasuredCurve.name, [f'{drive}.']))
+
+
+def without_effect(values: Mapping[str, Any], name: str, places: Sequence[str]) -> dict[str, Any]:
+    """Return the values of a model without an effect in some places, as the beginnings of keys."""
+    removed = tuple(f'{block}.{name}.{place}' for block in ('effects', UNCERTAINTIES)
+                    for place in places)
+    found = {key: value for key, value in values.items() if not key.startswith(removed)}
+    if not any(key.startswith(f'effects.{name}.') for key in found):
+        found[ACTIVE] = [other for other in found[ACTIVE] if other != name]
+    return found
 
 
 def _built(model: DriveModel, values: dict[str, Any]) -> DriveModel:

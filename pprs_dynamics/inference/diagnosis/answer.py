@@ -154,8 +154,9 @@ class Answer:
     @cached_property
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects of the row; those whose force removes most of the error first."""
-        found = [self.found(candidate) for candidate in Row(self.fits, self.fitted).effects]
-        return tuple(sorted(found, key=lambda effect: -effect.share))
+        return tuple(self.found(candidate) for candidate in sorted(
+            Row(self.fits, self.fitted).effects,
+            key=lambda candidate: -self.over_noise(self.remaining + self.force(candidate))))
 
     def found(self, candidate: EffectCandidate) -> FoundEffect:
         """Return an effect of the row with its values and errors."""
@@ -172,7 +173,6 @@ class Answer:
             candidate.effect, self.design.named(candidate.drives), parameters, force,
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
-            (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
             gain, objection(less / max(with_force, 1e-300), gain, self.decisions),
             self._ranked(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(

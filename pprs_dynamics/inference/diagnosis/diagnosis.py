@@ -138,9 +138,6 @@ class FoundEffect(JsonRecord):
         On held-out data: fitted without it, and with it [N].
     at_bound : tuple of str
         Parameters whose value is none: at the edge of what was tried.
-    share : float
-        By which its force alone lowers the error, over the error of the input model: of the root
-        mean square over drives, each in units of its noise.
     gain : PredictiveGain, optional
         By how much the reported effects predict held-out data better than without it; None where
         that is unknown.
@@ -171,7 +168,6 @@ class FoundEffect(JsonRecord):
     held_out_before: float
     held_out_after: float
     at_bound: tuple[str, ...] = ()
-    share: float = 0.0
     gain: PredictiveGain | None = None
     objection: str = ''
     without: RankedSet | None = None

@@ -585,22 +585,12 @@ def _repeats(regression: Regression, fit: JointFit, of_base: int, parts: Integer
     Each part is predicted from the others. What its errors are from that, beyond noise and what
     the others leave unknown, is by expectation 2 (1 - correlation) of the process's square.
     """
-    size, count = len(fit.coefficients), int(parts.max()) + 1
-    H, b = np.zeros((count, size, size)), np.zeros((count, size))
-    white = {}
-    for d in regression.drives:
-        series = regression.series[d]
-        index, _ = regression.local(fit, d)
-        root = series.spread(np.sqrt(regression.weights(fit, d)))
-        rows = series.inverse(regression.base[d] * root)
-        white[d] = index, rows
-        for k in range(count):
-            part = rows[:, parts[series.index] == k]
-            H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
-            b[k, index] += part[:-1] @ part[-1]
+    H, b = regression.in_parts(fit, parts)
+    white = {d: (index, regression.in_time(fit, d, rows)) for d in regression.drives
+             for index, rows in [regression.rows(fit, d)]}
     precision = np.array([column.precision for column in regression.columns])
     known = np.zeros((len(regression.residuals.drives), 2))  # squares of the process, and beyond
-    for k in range(count):
+    for k in range(len(H)):
         covariance = np.linalg.inv(H.sum(axis=0) - H[k] + np.diag(precision))
         coefficients = covariance @ (b.sum(axis=0) - b[k])
         for d, (index, rows) in white.items():

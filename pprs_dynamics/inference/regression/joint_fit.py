@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from pprs_dynamics.arrays import Array, Integers, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
@@ -157,6 +158,14 @@ class Regression:
             precision = (self.g_prior({d: values @ values.T for d, values in rows.items()})
                          if rows else 1e-300 * np.eye(1))
         return Block(rows, precision, mean)
+
+    def joined(self, blocks: Sequence[Block]) -> Block:
+        """Return blocks as one, with the same priors."""
+        rows = {d: np.concatenate([block.rows.get(d, np.zeros((block.size, len(series))))
+                                   for block in blocks])
+                for d, series in self.series.items() if any(d in block.rows for block in blocks)}
+        return Block(rows, block_diag(*(block.precision for block in blocks)), np.concatenate(
+            [np.zeros(block.size) if block.mean is None else block.mean for block in blocks]))
 
     def term_block(self, term: Term, names: Sequence[str]) -> Block:
         """Return the block of some coefficients of a term; of one that has none, of 1."""
@@ -334,13 +343,10 @@ class Regression:
 
     def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
         """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""
-        return self._in_time(fit, d, self.series[d].transform(rows))
+        return self.in_time(fit, d, self.series[d].transform(rows))
 
-    def innovations(self, fit: JointFit, d: int) -> Array:
-        """Return the residual of a drive in time, (n,), of unit spectrum under its noise."""
-        return self._in_time(fit, d, self.remaining(fit, d))
-
-    def _in_time(self, fit: JointFit, d: int, transformed: Array) -> Array:
+    def in_time(self, fit: JointFit, d: int, transformed: Array) -> Array:
+        """Return transformed rows in time, of unit spectrum under the noise of a fit."""
         series = self.series[d]
         return series.inverse(transformed * series.spread(np.sqrt(self.weights(fit, d))))
 
@@ -348,6 +354,36 @@ class Regression:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
         acting = [block for block in fit.blocks if d in block.rows]
         return np.concatenate((self.base_index[d], fit.index_of(acting))), acting
+
+    def rows(self, fit: JointFit, d: int) -> tuple[Integers, Array]:
+        """Return places of a drive's columns in a fit, and these with the error below, (p + 1, n).
+
+        Transformed.
+        """
+        index, acting = self.local(fit, d)
+        return index, np.concatenate([self.base[d][:-1], *(block.rows[d] for block in acting),
+                                      self.base[d][-1:]])
+
+    def in_parts(self, fit: JointFit, parts: Integers) -> tuple[Array, Array]:
+        """Return X^T S^-1 X and X^T S^-1 y of K parts of the samples, (K, P, P) and (K, P).
+
+        Parameters
+        ----------
+        fit : JointFit
+            At whose noise.
+        parts : (M,) int array
+            Part of each sample, from 0.
+        """
+        count, size = int(parts.max()) + 1, len(fit.coefficients)
+        H, b = np.zeros((count, size, size)), np.zeros((count, size))
+        for d, series in self.series.items():
+            index, rows = self.rows(fit, d)
+            white = self.in_time(fit, d, rows)
+            for k in range(count):
+                part = white[:, parts[series.index] == k]
+                H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
+                b[k, index] += part[:-1] @ part[-1]
+        return H, b
 
     def remaining(self, fit: JointFit, d: int) -> Array:
         """Return the DCT coefficients of the residual of a drive, (n,) [N]."""

@@ -233,18 +233,13 @@ class Components:
     @cached_property
     def score_test(self) -> ScoreTest[Component]:
         """All that more than one drive feels; computed when asked for."""
-        series = self.regression.series
-        entries, parts, first = [], [], 0
-        for component in (*self.structure, *self.spanning):
-            block = self.block(component)
-            entries.append(Entry(component, tuple(range(first, first + block.size)),
-                                 block.precision, block.mean))
-            parts.append({d: block.rows[d] if d in block.rows
-                          else np.zeros((block.size, len(series[d]))) for d in series})
-            first += block.size
-        return ScoreTest(self.regression, {
-            d: np.concatenate([part[d] for part in parts]).astype(np.float32) for d in series},
-            entries)
+        shared = [*self.structure, *self.spanning]
+        blocks = [self.block(component) for component in shared]
+        ends = np.cumsum([block.size for block in blocks]).tolist()
+        rows = self.regression.joined(blocks).rows
+        return ScoreTest(self.regression, {d: of.astype(np.float32) for d, of in rows.items()}, [
+            Entry(component, tuple(range(end - block.size, end)), block.precision, block.mean)
+            for component, block, end in zip(shared, blocks, ends, strict=True)])
 
     def shared_offers(self, fit: JointFit) -> list[tuple[Component, float]]:
         """Return what more than one drive feels, with its gains at the noise of a fit."""

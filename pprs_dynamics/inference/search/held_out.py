@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, Integers
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Regression
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -173,23 +173,8 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
         Whose forces the predictions of `error` contain; by default those of all effects.
     """
     regression, fit = fits.regression, fitted.fit
-    size = len(fit.coefficients)
-    total = len(regression.residuals)
-    edges = np.linspace(0, total, BLOCKS + 1)
-    H, b = np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size))
-    rows_of: dict[int, tuple[Integers, Array]] = {}
-    for d in regression.drives:
-        series = regression.series[d]
-        index, acting = regression.local(fit, d)
-        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in acting),
-                               regression.base[d][-1:]])
-        white = series.inverse(rows * np.sqrt(series.spread(regression.weights(fit, d))))
-        rows_of[d] = index, series.inverse(rows)
-        at = np.searchsorted(series.index, edges)
-        for k in range(BLOCKS):
-            part = white[:, at[k]:at[k + 1]]
-            H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
-            b[k, index] += part[:-1] @ part[-1]
+    parts = np.arange(len(regression.residuals)) * BLOCKS // len(regression.residuals)
+    H, b = regression.in_parts(fit, parts)
     prior = Prior.of(regression.columns, fit.blocks)
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
     coefficients = np.stack([fit.coefficients for fit in others])
@@ -200,9 +185,10 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
     plain[:, fit.index_of(left_out)] = 0.0
     left = np.full(regression.residuals.measured.shape, np.nan)
     squares, count = 0.0, 0
-    for d, (index, rows) in rows_of.items():
-        samples = regression.series[d].index
-        block = np.searchsorted(edges, samples, side='right') - 1
+    for d, series in regression.series.items():
+        index, transformed = regression.rows(fit, d)
+        samples, rows = series.index, series.inverse(transformed)
+        block = parts[samples]
         left[samples, d] = rows[-1] - np.sum(coefficients[block][:, index].T * rows[:-1], axis=0)
         rest = rows[-1] - np.sum(plain[block][:, index].T * rows[:-1], axis=0)
         squares, count = squares + float(rest @ rest), count + len(rest)

@@ -18,11 +18,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -119,16 +118,7 @@ def catalogue_blocks(fits: FittedSets) -> list[Block]:
     every = [shared, *([regression.transformed_block({d: rows}) for rows in (
         _directions(fits, effect, d) for effect in local.effects) if len(rows)]
         for d, local in components.local.items())]
-    return [_joined(fits.regression, blocks) for blocks in every if blocks]
-
-
-def _joined(regression: Regression, blocks: Sequence[Block]) -> Block:
-    """Return blocks as one, with the same priors."""
-    rows = {d: np.concatenate([block.rows.get(d, np.zeros((block.size, len(series))))
-                               for block in blocks])
-            for d, series in regression.series.items() if any(d in block.rows for block in blocks)}
-    return Block(rows, block_diag(*(block.precision for block in blocks)), np.concatenate(
-        [np.zeros(block.size) if block.mean is None else block.mean for block in blocks]))
+    return [fits.regression.joined(blocks) for blocks in every if blocks]
 
 
 def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:

@@ -12,15 +12,17 @@ pays for having had more tries.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import chain, compress
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.profiles import BINS, bin_edges, populated_edges
+from pprs_dynamics.inference.residuals.profiles import BINS, bin_edges, bin_of, populated_edges
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 TIME_BINS = 16
@@ -45,7 +47,7 @@ class Pattern(NamedTuple):
     ----------
     kind : str
         'offset', 'range', 'bump', 'directed_range', 'growth', 'directed_growth', 'one_way',
-        'friction', 'fading', 'fast', 'scatter', 'ripple' or 'line'.
+        'friction', 'fading', 'fast', 'ripple' or 'line'.
     limits : (float, float) or None
         Of the variable, where the pattern is confined to them.
     scale : float
@@ -186,26 +188,37 @@ def _scalar(name: str, values: Array, sign: Array | None, alike: int) -> Family:
     # In proportion, where that differs from an offset.
     if low * high > 0 and high - low > 0.3 * max(abs(low), abs(high)):
         lines.append(values / np.abs(values).max())
-    columns, weights, patterns = [bins], [_runs(len(bins))], _run_patterns('range', edges)
-    columns.append(np.stack(lines))
-    weights.append(np.eye(len(lines)))
-    patterns += [Pattern('growth')] * len(lines)
+    parts = [_ranges('range', bins, edges), _each('growth', lines)]
     if sign is not None:
-        columns += [sign * bins, sign * np.stack(lines)]
-        weights += [_runs(len(bins)), np.eye(len(lines))]
-        patterns += _run_patterns('directed_range', edges)
-        patterns += [Pattern('directed_growth')] * len(lines)
+        parts += [_ranges('directed_range', sign * bins, edges),
+                  _each('directed_growth', sign * np.stack(lines))]
     if name == 'position':
-        bumps, where = _bumps(values)
-        columns.append(bumps)
-        weights.append(np.eye(len(bumps)))
-        patterns += where
-    return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
-                  tuple(patterns), alike, edges=edges)
+        parts.append(_bumps(values))
+    return _family(name, parts, alike, edges)
 
 
-def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
-    """Return smooth bumps at many places and of several widths, and where they are.
+Part = tuple[Array, Array, list[Pattern]]
+"""Columns of a family, the combinations of them that are patterns, and these."""
+
+
+def _family(name: str, parts: list[Part], alike: int, edges: Array) -> Family:
+    columns, weights, patterns = zip(*parts, strict=True)
+    return Family(name, np.concatenate(columns).astype(np.float32), block_diag(*weights),
+                  tuple(chain.from_iterable(patterns)), alike, edges=edges)
+
+
+def _ranges(kind: str, bins: Array, edges: Array) -> Part:
+    return bins, _runs(len(bins)), _run_patterns(kind, edges)
+
+
+def _each(kind: str, columns: Iterable[Array], limits: tuple[float, float] | None = None,
+          ) -> Part:
+    rows = np.stack(list(columns))
+    return rows, np.eye(len(rows)), [Pattern(kind, limits)] * len(rows)
+
+
+def _bumps(values: Array) -> Part:
+    """Return smooth bumps at many places and of several widths.
 
     A smooth force is no range: at the limits of a range the difference would be a jump, which
     whitening makes larger than what the range explains.
@@ -218,44 +231,32 @@ def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
             columns.append(np.exp(-0.5 * ((values - centre) / (BUMP_DEVIATION * width)) ** 2))
             patterns.append(Pattern('bump', (max(centre - width / 2, low),
                                              min(centre + width / 2, low + span))))
-    return np.stack(columns), patterns
+    return np.stack(columns), np.eye(len(columns)), patterns
 
 
 def _velocity(name: str, values: Array, sign: Array | None, alike: int) -> Family:
     speeds = speed_edges(values)
     edges = populated_edges(values, np.concatenate((-speeds[:0:-1], speeds)))
     edges[0], edges[-1] = min(edges[0], values.min()), max(edges[-1], values.max())
-    bins = _indicators(values, edges)
-    fast = values / np.abs(values).max()
-    lines = np.stack((fast, fast * np.abs(fast), np.abs(fast)))
-    columns, weights, patterns = [bins], [_runs(len(bins))], _run_patterns('range', edges)
+    bins, runs, ranges = _ranges('range', _indicators(values, edges), edges)
     # What begins or ends at a standstill and spans all of one direction is the direction's.
-    keep = np.array([set(p.limits or ()) not in ({0.0, float(edges[-1])}, {0.0, float(edges[0])})
-                     for p in patterns])
-    weights[0] = weights[0][keep]
-    patterns = [pattern for pattern, kept in zip(patterns, keep, strict=True) if kept]
-    columns.append(lines)
-    weights.append(np.eye(len(lines)))
-    patterns += [Pattern('growth')] * len(lines)
+    keep = [set(p.limits or ()) not in ({0.0, float(edges[-1])}, {0.0, float(edges[0])})
+            for p in ranges]
+    fast = values / np.abs(values).max()
+    parts = [(bins, runs[keep], list(compress(ranges, keep))),
+             _each('growth', (fast, fast * np.abs(fast), np.abs(fast)))]
     if len(speeds) > 2:
         # Fast in either direction (one range cannot say it), and with the sign of the motion.
         even = _indicators(np.abs(values), speeds)
-        columns.append(even)
-        outer = np.triu(np.ones((len(even), len(even))))[1:]
-        weights.append(outer)
-        patterns += [Pattern('fast', (float(edge), float(speeds[-1]))) for edge in speeds[1:-1]]
+        parts.append((even, np.triu(np.ones((len(even), len(even))))[1:], [
+            Pattern('fast', (float(edge), float(speeds[-1]))) for edge in speeds[1:-1]]))
         if sign is not None:
-            columns.append(sign * even)
-            weights.append(_runs(len(even)))
-            patterns += _run_patterns('directed_range', speeds)
+            parts.append(_ranges('directed_range', sign * even, speeds))
             # Friction that falls off with speed has no edge.
-            turned = (sign, _turned(values, REVERSAL_WIDTHS[1]))
-            for edge in speeds[1:-1]:
-                columns.append(np.stack([row * np.exp(-(values / edge) ** 2) for row in turned]))
-                weights.append(np.eye(len(turned)))
-                patterns += [Pattern('fading', (0.0, float(edge)))] * len(turned)
-    return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
-                  tuple(patterns), alike, edges=edges)
+            turned = np.stack((sign, _turned(values, REVERSAL_WIDTHS[1])))
+            parts += [_each('fading', turned * np.exp(-(values / edge) ** 2), (0.0, float(edge)))
+                      for edge in speeds[1:-1]]
+    return _family(name, parts, alike, edges)
 
 
 def _ripple(position: Array) -> Family:
@@ -270,8 +271,7 @@ def _ripple(position: Array) -> Family:
 
 
 def _indicators(values: Array, edges: Array) -> Array:
-    index = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, len(edges) - 2)
-    result: Array = (index == np.arange(len(edges) - 1)[:, None]).astype(float)
+    result: Array = (bin_of(values, edges) == np.arange(len(edges) - 1)[:, None]).astype(float)
     return result
 
 
@@ -288,16 +288,6 @@ def _run_patterns(kind: str, edges: Array) -> list[Pattern]:
     bins = len(edges) - 1
     return [Pattern(kind, (float(edges[a]), float(edges[b + 1])))
             for a in range(bins) for b in range(a, bins) if b - a + 1 < bins]
-
-
-def _diagonal(blocks: list[Array]) -> Array:
-    height, width = (sum(block.shape[axis] for block in blocks) for axis in (0, 1))
-    result = np.zeros((height, width))
-    row = column = 0
-    for block in blocks:
-        result[row:row + block.shape[0], column:column + block.shape[1]] = block
-        row, column = row + block.shape[0], column + block.shape[1]
-    return result
 
 
 def trial_limits(

@@ -21,7 +21,6 @@ from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
-    Candidate,
     CandidateSet,
     CostTerms,
     EffectCandidate,
@@ -103,12 +102,6 @@ class Row:
                      if candidate.course is None or candidate.course.kind != DURING)
 
     @property
-    def patterns(self) -> tuple[Candidate, ...]:
-        """Candidates that are no effect of the machine: patterns, and what passes."""
-        mine = self.effects
-        return tuple(candidate for candidate in self.fitted.candidates if candidate not in mine)
-
-    @property
     def placed_names(self) -> frozenset[str]:
         """Names of the effects, with their link or joint where they are on one."""
         return frozenset(candidate.placed_name for candidate in self.effects)
@@ -184,11 +177,6 @@ class ModelTable:
     def best(self) -> Row:
         """The row of least cost, which is reported."""
         return self.rows[0]
-
-    @property
-    def nothing(self) -> Row:
-        """The row without any effect or pattern."""
-        return next(row for row in self.rows if not row.fitted.candidates)
 
     @cached_property
     def reported(self) -> CandidateSet:

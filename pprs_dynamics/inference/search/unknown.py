@@ -236,7 +236,8 @@ class DrivePatterns:
     def line(self, fit: JointFit) -> UnknownCandidate | None:
         """Return the strongest spectral line of the residual of a fit."""
         longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
-        white = self.regression.innovations(fit, self.d)[longest]
+        white = self.regression.in_time(
+            fit, self.d, self.regression.remaining(fit, self.d))[longest]
         at = self.series.index[longest] - self.series.index[longest.start]
         n, period = int(at[-1]) + 1, self.residuals.period
         lowest = self.prior_costs.decisions.line_periods
@@ -254,9 +255,7 @@ class DrivePatterns:
             heights = np.abs(np.exp(-2j * np.pi * trial[:, None] * time) @ white)
             frequency = float(trial[int(np.argmax(heights))])
             step /= 5
-        phase = 2 * np.pi * frequency * self.residuals.time
-        pattern = Pattern('line', scale=frequency)
-        rows = np.stack((np.cos(phase), np.sin(phase)))
+        pattern, rows = Pattern('line', scale=frequency), _wave(frequency, self.residuals.time)
         # As many frequencies as the stretch resolves were tried.
         family = Family('frequency', rows, np.zeros((0, 0)), (pattern,), alike=n // 2,
                         paired=True)
@@ -313,16 +312,14 @@ class DrivePatterns:
         rest = self.regression.remaining(fit, self.d) * root
         middle = time - time.mean()
         for _ in range(FREQUENCY_STEPS):
-            wave = np.stack((np.cos(2 * np.pi * frequency * time),
-                             np.sin(2 * np.pi * frequency * time)))
+            wave = _wave(frequency, time)
             a, b = np.linalg.lstsq((self.series.transform(wave) * root).T, rest, rcond=None)[0]
             slope = 2 * np.pi * middle * (b * wave[0] - a * wave[1])
             rows = self.series.transform(np.concatenate((wave, slope[None]))) * root
             step = np.linalg.lstsq(rows.T, rest, rcond=None)[0][2]
             frequency += float(np.clip(step, -0.25 / np.ptp(time), 0.25 / np.ptp(time)))
-        phase = 2 * np.pi * frequency * time
-        rows = np.stack((np.cos(phase), np.sin(phase)))
-        return self.candidate(candidate.family, Pattern('line', scale=frequency), rows)
+        return self.candidate(candidate.family, Pattern('line', scale=frequency),
+                              _wave(frequency, time))
 
     def values(self, variable: str) -> Array:
         """Return a variable by its name in the interface, also one of another drive, (n,)."""
@@ -331,6 +328,12 @@ class DrivePatterns:
         values = self.residuals.variable(name, drive)
         assert values is not None
         return values
+
+
+def _wave(frequency: float, time: Array) -> Array:
+    """Return cosine and sine of a frequency [Hz], (2, n)."""
+    phase = 2 * np.pi * frequency * time
+    return np.stack((np.cos(phase), np.sin(phase)))
 
 
 def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
