@@ -21,7 +21,6 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.fit_curve import (
     fit_curve,
-    held_out_residuals,
     with_curve,
     without_curve,
     without_effect,
@@ -109,7 +108,7 @@ def adopt(
                              reference=reference)
     case = _Case(model, recordings, validate, diagnosis, reference, is_alone=beside is None)
     if request.variable:
-        found = _with_curve(case, request, report)
+        found = _with_curve(case, request)
     else:
         try:
             found = _with_effect(case, request, beside or ())
@@ -437,7 +436,7 @@ def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
 # A measured curve
 
 
-def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], None]) -> Adoption:
+def _with_curve(case: _Case, request: EffectRequest) -> Adoption:
     """Return the undecided adoption of a measured curve."""
     model, drive = case.model, request.drive
     bare = without_curve(model, drive)
@@ -447,8 +446,9 @@ def _with_curve(case: _Case, request: EffectRequest, report: Callable[[float], N
     if case.validate:
         given, found = (measure_residuals(each, case.validate)[0] for each in (bare, after))
     else:
-        given, found = start, held_out_residuals(
-            start, request, lambda share: report(DIAGNOSED + (1 - DIAGNOSED) * share))
+        held_out = np.zeros_like(start.model)
+        held_out[:, model.drives.index(drive)] = fitted.held_out
+        given, found = start, replace(start, model=start.model + held_out)
     count = len(model.drives)
     # Chosen among the curves of every drive over every variable.
     evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))

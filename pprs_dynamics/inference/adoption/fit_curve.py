@@ -10,9 +10,8 @@ likelihood. The same number, against that without a curve, is the evidence.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -52,12 +51,15 @@ class FittedCurve:
         Twice the gain in log restricted likelihood, the curve's coefficients integrated out.
     freedom : float
         Effective number of coefficients.
+    held_out : (M,) array
+        Its force in each tenth of the recordings by a fit to the others [N].
     """
 
     curve: Curve
     covariance: Array
     evidence: float
     freedom: float
+    held_out: Array
 
     def parameters(self, drive: str, unit: str) -> dict[str, Estimate]:
         """Return the curve's values with their standard deviations, by key of the model file."""
@@ -88,8 +90,7 @@ def curve_variable(residuals: Residuals, request: EffectRequest) -> Array:
     return values
 
 
-def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | None = None,
-              ) -> FittedCurve:
+def fit_curve(residuals: Residuals, request: EffectRequest) -> FittedCurve:
     """Return the curve of a drive's error that has the largest evidence.
 
     Parameters
@@ -97,8 +98,6 @@ def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | No
     residuals : Residuals
         Of the model that the curve joins.
     request : EffectRequest
-    left_out : slice, optional
-        Samples that are not fitted.
 
     Raises
     ------
@@ -106,10 +105,6 @@ def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | No
         Where the variable does not vary, or the drive was not measured.
     """
     drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
-    if left_out is not None:
-        measured = residuals.measured.copy()
-        measured[left_out, drive] = np.nan
-        residuals = replace(residuals, measured=measured)
     try:
         regression = Regression(residuals, drives=(drive,))
     except ResidualsError:
@@ -141,26 +136,14 @@ def fit_curve(residuals: Residuals, request: EffectRequest, left_out: slice | No
     noise = regression.fit((block(FLEXIBLE),))
     best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
                key=lambda fit: fit.deviance)
+    parts = np.arange(len(residuals)) * BLOCKS // len(residuals)
+    others = np.stack([fit.coefficients for fit in regression.from_others(best, parts)])
     precision = best.blocks[0].precision
     freedom = len(best.coefficients) - float(np.trace(best.covariance @ precision))
     return FittedCurve(
         Curve(request.variable, float(start), float(end), tuple(best.coefficients.tolist()), turns),
-        best.covariance, regression.at((), noise).deviance - best.deviance, freedom)
-
-
-def held_out_residuals(
-    residuals: Residuals, request: EffectRequest,
-    report: Callable[[float], None] = lambda share: None,
-) -> Residuals:
-    """Return residuals whose model has the curve, in each block from a fit to the others."""
-    drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
-    model: Array = residuals.model.copy()
-    edges = np.linspace(0, len(residuals), BLOCKS + 1).astype(int)
-    for number, (first, last) in enumerate(pairwise(edges)):
-        block = slice(int(first), int(last))
-        model[block, drive] += fit_curve(residuals, request, block).curve.force(x[block])
-        report((number + 1) / BLOCKS)
-    return replace(residuals, model=model)
+        best.covariance, regression.at((), noise).deviance - best.deviance, freedom,
+        np.sum(others[parts].T * columns, axis=0))
 
 
 def with_curve(model: DriveModel, drive: str, fitted: FittedCurve) -> DriveModel:

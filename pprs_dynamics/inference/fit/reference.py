@@ -585,19 +585,16 @@ def _repeats(regression: Regression, fit: JointFit, of_base: int, parts: Integer
     Each part is predicted from the others. What its errors are from that, beyond noise and what
     the others leave unknown, is by expectation 2 (1 - correlation) of the process's square.
     """
-    H, b = regression.in_parts(fit, parts)
     white = {d: (index, regression.in_time(fit, d, rows)) for d in regression.drives
              for index, rows in [regression.rows(fit, d)]}
     precision = np.array([column.precision for column in regression.columns])
     known = np.zeros((len(regression.residuals.drives), 2))  # squares of the process, and beyond
-    for k in range(len(H)):
-        covariance = np.linalg.inv(H.sum(axis=0) - H[k] + np.diag(precision))
-        coefficients = covariance @ (b.sum(axis=0) - b[k])
+    for k, others in enumerate(regression.from_others(fit, parts)):
         for d, (index, rows) in white.items():
             part = rows[:, parts[regression.series[d].index] == k]
-            left = part[-1] - coefficients[index] @ part[:-1]
+            left = part[-1] - others.coefficients[index] @ part[:-1]
             expected = part.shape[1] + np.sum(
-                (covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
+                (others.covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
             process = part[of_base:-1]
             known[d] += (np.sum(process ** 2 / precision[index[of_base:], None]),
                          left @ left - expected)

@@ -31,6 +31,8 @@ from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,
     NormalEquations,
+    Posterior,
+    Prior,
     Solution,
     term_gains,
 )
@@ -364,8 +366,8 @@ class Regression:
         return index, np.concatenate([self.base[d][:-1], *(block.rows[d] for block in acting),
                                       self.base[d][-1:]])
 
-    def in_parts(self, fit: JointFit, parts: Integers) -> tuple[Array, Array]:
-        """Return X^T S^-1 X and X^T S^-1 y of K parts of the samples, (K, P, P) and (K, P).
+    def from_others(self, fit: JointFit, parts: Integers) -> list[Posterior]:
+        """Return the posterior of all coefficients of a fit without each part of the samples.
 
         Parameters
         ----------
@@ -383,7 +385,8 @@ class Regression:
                 part = white[:, parts[series.index] == k]
                 H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
                 b[k, index] += part[:-1] @ part[-1]
-        return H, b
+        prior = Prior.of(self.columns, fit.blocks)
+        return [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(count)]
 
     def remaining(self, fit: JointFit, d: int) -> Array:
         """Return the DCT coefficients of the residual of a drive, (n,) [N]."""
@@ -396,7 +399,7 @@ class Regression:
 
     def gain(self, fit: JointFit, block: Block) -> float:
         """Return by how much the deviance falls with one more block, at the noise of a fit."""
-        S, b, _ = self._beside(fit, block)
+        S, b = self._beside(fit, block)
         mean = np.zeros(block.size) if block.mean is None else block.mean
         return float(term_gains(S[None], b[None], block.precision[None], mean[None])[0])
 
@@ -404,12 +407,12 @@ class Regression:
         """Return the information on a block's coefficients beyond those of a fit, (k, k)."""
         return self._beside(fit, block)[0]
 
-    def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
-        """Return own sums of products, those with the residual, and full products of a block."""
+    def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array]:
+        """Return a block's sums of products beyond a fit, and those with its residual."""
         taken, b = Columns(self, block.rows).projected(fit)
         S = np.sum([np.tensordot(self.weights(fit, d), self.products([block], d)[block, block], 1)
                     for d in block.rows], axis=0)
-        return S - taken @ fit.covariance @ taken.T, b, S
+        return S - taken @ fit.covariance @ taken.T, b
 
 
 class Columns:

@@ -18,7 +18,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Regression
-from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -174,9 +173,7 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
     """
     regression, fit = fits.regression, fitted.fit
     parts = np.arange(len(regression.residuals)) * BLOCKS // len(regression.residuals)
-    H, b = regression.in_parts(fit, parts)
-    prior = Prior.of(regression.columns, fit.blocks)
-    others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
+    others = regression.from_others(fit, parts)
     coefficients = np.stack([fit.coefficients for fit in others])
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
