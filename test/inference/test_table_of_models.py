@@ -94,22 +94,6 @@ def test_a_rival_is_taken_from_a_row_without_the_effect_that_it_replaces() -> No
     assert rival.cost == pytest.approx(2.0)
 
 
-def test_a_freer_form_of_the_same_friction_is_no_rival() -> None:
-    table = table_of('viscous_friction')
-    kind = CATALOGUE['asymmetric_friction']
-    both = effect('asymmetric_friction', kind.variants.index(
-        ('viscous_forward', 'viscous_backward')))
-    assert [rival.instead for rival in with_rows(
-        table, {(both,): 1.0, (SPRING,): 2.0}).rivals(MARGIN)] == [('drive_spring',)]
-    # With as many coefficients it is another claim, however alike the columns are.
-    found = with_rows(table, {(DRY,): 1.0})
-    row = found.rows[1]
-    (mine,), (theirs,) = table.best.fitted.blocks.values(), row.fitted.blocks
-    alike = Row(row.fits, replace(row.fitted, blocks={theirs: mine}), row.linearisation)
-    found = replace(found, exact={**found.exact, row.fitted.row_key: alike})
-    assert [rival.instead for rival in found.rivals(MARGIN)] == [('coulomb_friction',)]
-
-
 def test_a_suspect_is_one_more_effect_beside_all_that_is_reported() -> None:
     table = table_of('viscous_friction')
     pattern = best_patterns(table.patterns, table.last.evaluate(()).fit, 1)[0]

@@ -14,8 +14,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import numpy as np
-
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
@@ -27,7 +25,7 @@ from pprs_dynamics.inference.search.candidates import (
     RowKey,
 )
 from pprs_dynamics.inference.search.courses import fit_courses
-from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
+from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import (
     fitted_model,
     has_nonlinear,
@@ -42,7 +40,6 @@ from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-SAME = 1e-6  # share of a column's square outside a span, up to which it is inside
 MOST_STEPS = 6  # of relinearisation of one row
 MOST_EXACT = 4  # rows of one search that get exact costs
 LEAST_CHANGE = 2.0  # of a cost, for which a row is computed anew
@@ -229,32 +226,9 @@ class ModelTable:
             missing = sorted(name for place, name in mine.items() if place not in theirs)
             instead = sorted(place if name in mine.values() else name
                              for place, name in theirs.items() if place not in mine)
-            if missing and instead and not self._is_freer(row, missing, instead):
+            if missing and instead:
                 rivals.append(Rival(row, tuple(missing), tuple(instead)))
         return rivals
-
-    @outside_cost('a freer form of the same friction is no rival')
-    def _is_freer(self, row: Row, missing: Sequence[str], instead: Sequence[str]) -> bool:
-        """Return whether friction of a row contains all that is missing, with more coefficients.
-
-        Asymmetric friction contains viscous friction: the same claim with more freedom.
-        """
-        best = self.best.fitted
-        for component in (component for c in best.effects if c.name in missing
-                          for component in c.components):
-            theirs = [row.fitted.blocks[other].rows[component.drive] for c in row.effects
-                      if c.name in instead and c.effect.is_friction for other in c.components
-                      if component.drive is not None and other.drive == component.drive]
-            if component.drive is None or not component.effect.is_friction or not theirs:
-                return False
-            mine = best.blocks[component].rows[component.drive]
-            columns = np.concatenate(theirs)
-            if len(columns) <= len(mine):
-                return False
-            outside = mine - np.linalg.lstsq(columns.T, mine.T, rcond=None)[0].T @ columns
-            if np.sum(outside ** 2) > SAME * np.sum(mine ** 2):
-                return False
-        return True
 
     def suspects(self, margin: float) -> list[tuple[EffectCandidate, Row]]:
         """Return effects that, as one more, cost less than a margin above the least."""
