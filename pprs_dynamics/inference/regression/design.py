@@ -37,7 +37,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.drive_ranges import SecondEncoders, drive_range
 from pprs_dynamics.inference.regression.sensitivities import (
-    BARE,
     BY_FRICTION,
     DRIVE_WIDTHS,
     HOMING,
@@ -384,8 +383,7 @@ class Design:
         there = [(PRESENT + effect.name, type(effect)) for effect in given.effects
                  if isinstance(effect, StructureEffect)]
         structure = tuple(
-            Term(effect, None, {}, _by_drive(stacked[name], count),
-                 _by_drive(stacked[BARE + name], count) if BARE + name in stacked else None)
+            Term(effect, None, {}, {d: stacked[name][:, d] for d in range(count)})
             for name, effect in (
                 *((effect.name, effect) for effect in sensitivities.searched), *there))
         homing, inertia = (tuple(dict(enumerate(column)) for column in stacked.get(name, ()))
@@ -673,7 +671,3 @@ def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
 
 def _rows(column: Array) -> dict[int, Array]:
     return {drive: row for drive, row in enumerate(column) if np.any(row)}
-
-
-def _by_drive(columns: Array, count: int) -> dict[int, Array]:
-    return {d: columns[:, d] for d in range(count)}

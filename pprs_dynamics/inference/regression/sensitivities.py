@@ -46,8 +46,7 @@ PER_CHAIN = ('masses.slides', 'masses.lifts')
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
-NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
-INERTIA = 'inertia'
+NUMBERS, HOMING, PRESENT, INERTIA = 'numbers', 'homing', 'present ', 'inertia'
 OF_DRIVES, OF_JOINTS, BY_FRICTION = 'drive widths', 'passive widths', 'loads by friction'
 
 
@@ -166,7 +165,6 @@ class Sensitivities:
         - `HOMING`: per metre that each drive is measured too far.
         - `INERTIA`: per acceleration that each drive is measured too much.
         - Names of `searched`: the coefficients of each effect.
-        - `BARE` + name: the same with friction that does not follow the loads.
         - `PRESENT` + name: the coefficients of effects that the given model has.
 
         Parameters
@@ -207,8 +205,7 @@ class Sensitivities:
             if name in self.known:
                 continue
             if issubclass(effect, BodyEffect):
-                columns[name], columns[BARE + name] = map(
-                    samples.interpolated, self._of_bodies(effect, samples.nodes))
+                columns[name] = samples.interpolated(self._of_bodies(effect, samples.nodes))
             else:
                 columns[name] = samples.treated(self._of_forces(effect, state))
         return columns
@@ -338,33 +335,29 @@ class Sensitivities:
         return [(effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale}).force(state)
                  - before) / c.scale for c in effect.coefficients]
 
-    def _of_bodies(self, effect: type[BodyEffect], state: Any,
-                   ) -> tuple[list[Array], list[Array]]:
+    def _of_bodies(self, effect: type[BodyEffect], state: Any) -> list[Array]:
         """Return columns of an effect on bodies, per unit of each coefficient.
 
-        As the model says, and as they would be if friction did not follow the loads that the
-        effect adds (a preloaded guide). Around the values that the model has, but those of added
-        bodies are around none: `AddedBody.around` makes them exact for where one is.
+        With the friction that its loads cause. Around the values that the model has, but those of
+        added bodies are around none: `AddedBody.around` makes them exact for where one is.
         """
         present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
             if self.is_planned and self.model.robot.structure is not None:
-                rigid = self._of_rigid_bodies(effect, state)
-                return rigid, rigid
+                return self._of_rigid_bodies(effect, state)
         if effect not in self._steps:
             values = {} if present is None else effect.to_coefficients(present.values)
             self._steps[effect] = [effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
                                    for c in effect.coefficients]
         before = self._own_efforts(state)
-        full, bare = [], []
+        found = []
         for c, moved in zip(effect.coefficients, self._steps[effect], strict=True):
-            found = moved.apply(state) if present is None else self._at(replace(
+            loaded = moved.apply(state) if present is None else self._at(replace(
                 self.model, effects=tuple(moved if other is present else other
                                           for other in self.model.effects)), state)
-            full.append((self._efforts(self.model, found) - before) / c.scale)
-            bare.append((found.rigid_force - state.rigid_force) / c.scale)
-        return full, bare
+            found.append((self._efforts(self.model, loaded) - before) / c.scale)
+        return found
 
     def _of_rigid_bodies(self, effect: type[AddedBody], state: Any) -> list[Array]:
         """Return columns of added bodies without the friction that they cause."""

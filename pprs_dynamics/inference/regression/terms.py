@@ -32,8 +32,6 @@ class Term:
     shape : mapping of str to float
     rows : dict of drive to (k, M) array
         One row per coefficient [N].
-    bare : dict of drive to (k, M) array, optional
-        The rows if friction did not follow the loads that the effect adds.
     course : (M,) array, optional
         By which the rows are multiplied already: which share of the effect is there when.
     """
@@ -42,15 +40,12 @@ class Term:
     drive: int | None
     shape: Mapping[str, float]
     rows: Rows
-    bare: Rows | None = None
     course: Array | None = None
 
     def following(self, course: Array) -> Term:
         """Return the term that is there as a course (M,) says."""
         return replace(
-            self, rows={d: rows * course for d, rows in self.rows.items()}, course=course,
-            bare=None if self.bare is None else {d: rows * course
-                                                 for d, rows in self.bare.items()})
+            self, rows={d: rows * course for d, rows in self.rows.items()}, course=course)
 
     def force(self, coefficients: Mapping[str, float]) -> dict[int, Array]:
         """Return the force of coefficients by name, (M,) by drive [N]."""

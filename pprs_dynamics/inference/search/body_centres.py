@@ -41,11 +41,8 @@ def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
     """Return the term with columns for a body at a centre; `mass` names its mass."""
     assert issubclass(term.effect, AddedBody)
     kind, prefix, away = term.effect, mass.removesuffix('mass'), np.array(centre)
-
-    def moved(rows: Mapping[int, Array]) -> dict[int, Array]:
-        return {d: kind.rows_about(prefix, rows_of, away) for d, rows_of in rows.items()}
-    return replace(term, rows=moved(term.rows),
-                   bare=None if term.bare is None else moved(term.bare))
+    return replace(term, rows={
+        d: kind.rows_about(prefix, rows, away) for d, rows in term.rows.items()})
 
 
 def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,

@@ -30,8 +30,8 @@ from pprs_dynamics.system.json_records import JsonRecord
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
-# Kinds of nuisance columns: whether friction follows a load, how it reverses, deviations of forms.
-LOAD, REVERSAL, FORM = 'load', 'reversal', 'form'
+# Kinds of nuisance columns: how friction reverses, and deviations of forms.
+REVERSAL, FORM = 'reversal', 'form'
 
 
 @dataclass(frozen=True)

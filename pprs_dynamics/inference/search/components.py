@@ -336,15 +336,6 @@ class Components:
         """Return the values of a shape parameter that are tried, in order."""
         return sorted({trial[name] for trial in self.trials(component)})
 
-    def unloaded(self, component: Component) -> dict[int, Array] | None:
-        """Return what its columns change by if friction did not follow its loads, (k, n)."""
-        term = self.term(component)
-        if term.bare is None:
-            return None
-        chosen = [term.names.index(name) for name in component.names]
-        return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
-                for d, values in term.bare.items() if d in self.regression.series}
-
     def nuisance_rows(self, component: Component) -> Mapping[str, dict[int, Array]]:
         """Return the uncertainty of its form by kind and drive, (k, w, n) for k coefficients.
 
@@ -364,10 +355,6 @@ class Components:
                     for d, values in rows.items()
                     if np.any(values) and d in self.regression.series})}
         return self._nuisance[component]
-
-    def leaves_open(self, component: Component) -> bool:
-        """Return whether there are columns for the uncertainty of a component's form."""
-        return self.term(component).bare is not None or bool(self.nuisance_rows(component))
 
     def prior_cost(self, candidate: Candidate) -> CostTerms:
         """Return the prior cost of everything that was chosen."""

@@ -19,7 +19,6 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
-    LOAD,
     Candidates,
     CandidateSet,
     Component,
@@ -139,7 +138,7 @@ class FittedSets:
             return CandidateSet((), fit, self._terms(fit))
         start = self.evaluate(()).fit
         nuisance: Nuisance = {}
-        if any(self.components.leaves_open(component) for c in candidates
+        if any(self.components.nuisance_rows(component) for c in candidates
                for component in c.components):
             # The size of its forces, in proportion to which friction is in doubt, need not be
             # exact: the noise of the empty set does, and steps of it, whose columns are kept.
@@ -190,8 +189,8 @@ class FittedSets:
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:
         """Return columns for what effects leave open, in proportion to their fitted force.
 
-        Whether friction follows the loads that an effect adds; how friction turns over; and how
-        real forms depart from the catalogue's. Each has a coefficient of unit prior.
+        How friction turns over, and how real forms depart from the catalogue's. Each has a
+        coefficient of unit prior.
         """
         found = {}
         for component in (component for c in candidates for component in c.components):
@@ -205,14 +204,10 @@ class FittedSets:
 
     def _nuisance_of(self, component: Component, c: Array) -> Mapping[str, Block]:
         """Return the columns of one component, for its coefficients (k,)."""
-        blocks = {}
-        unloaded = self.components.unloaded(component)
-        if unloaded is not None:
-            blocks[LOAD] = Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1))
-        for kind, by_drive in self.components.nuisance_rows(component).items():
-            rows = {d: np.tensordot(c, values, 1) for d, values in by_drive.items()}
-            blocks[kind] = Block(rows, np.eye(len(next(iter(rows.values())))))
-        return blocks
+        rows = {kind: {d: np.tensordot(c, values, 1) for d, values in by_drive.items()}
+                for kind, by_drive in self.components.nuisance_rows(component).items()}
+        return {kind: Block(by_drive, np.eye(len(next(iter(by_drive.values())))))
+                for kind, by_drive in rows.items()}
 
     def at_noise_of(self, fitted: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
