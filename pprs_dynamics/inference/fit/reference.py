@@ -34,7 +34,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import PprsError
@@ -46,7 +45,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
+from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, OpenForces
 from pprs_dynamics.inference.residuals.reconstruction import CHUNK, Reconstruction
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -63,8 +62,6 @@ ROUNDS = 3  # of the size of the process
 LEAST_COUNT = 1.0  # determined coefficients, over which the size of a process is taken
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
-FINER = 8  # points for each sample of a reference, among which the nearest is looked for
-OCTAVES = 6  # of frequency, in each of which another share of the unexplained error repeats
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_DIRECTIONS = 24  # that become columns of all drives together
 # States on which a process is conditioned, over all drives and over one, and further ones of
@@ -102,11 +99,6 @@ class States:
         q, v = motion_of(residuals)
         return cls(q.mean(axis=0), np.maximum(q.std(axis=0), 1e-9),
                    np.maximum(SLOW * np.sqrt((v ** 2).mean(axis=0)), 1e-9))
-
-    def path(self, residuals: Residuals) -> Array:
-        """Return positions and velocities of a recording in standard deviations, (M, 2 D)."""
-        q, v = motion_of(residuals)
-        return np.concatenate(((q - self.centre) / self.spread, v / self.speed * SLOW), axis=1)
 
     def at(self, q: Array, v: Array, drive: int | None = None) -> Array:
         """Return the states of all drives in a motion (M, D), or of one, (M, k)."""
@@ -412,13 +404,10 @@ class Reference:
         together, apart : sequence of (M, k) array
             Of every drive; columns of unit variance, the first ones shared by all drives.
         """
-        regression, again = Regression(residuals), self._met_again(residuals)
-        spectra = regression.fit(()).spectra
-        white, alone = [], []
+        regression = Regression(residuals)
+        spectra, white = regression.fit(()).spectra, []
         for k, d in enumerate(regression.drives):
             series = regression.series[d]
-            alone.append(np.concatenate((apart[d], np.stack(
-                _in_bands(series, again[:, d]), axis=1)), axis=1))
             if d in self.regression.drives:
                 of_reference = np.interp(
                     regression.bands.frequency, self.regression.bands.frequency,
@@ -432,41 +421,8 @@ class Reference:
         shared, rest = axes[:, :MOST_DIRECTIONS], axes[:, MOST_DIRECTIONS:]
         return (tuple(ReferenceDirection({d: rows @ axis for d, rows in enumerate(together)}, 1.0)
                       for axis in shared.T),
-                {d: OpenForces(np.concatenate((alone[k], together[d] @ rest), axis=1).T, spectra[k])
+                {d: OpenForces(np.concatenate((apart[d], together[d] @ rest), axis=1).T, spectra[k])
                  for k, d in enumerate(regression.drives)})
-
-    def _met_again(self, residuals: Residuals) -> Array:
-        """Return the residual of the processes on the path of the reference, (M, D).
-
-        Gears ripple and friction turns over within less than the lengths of a process. Where the
-        path is the same, so are they: the residual of the fit at the state of the reference that is
-        nearest is then in the recording as well, by a share that is not known. 0 elsewhere.
-        """
-        reference, states = self.regression.residuals, States.of(self.regression.residuals)
-        left = np.zeros_like(reference.measured)
-        for d in self.regression.drives:
-            series = self.regression.series[d]
-            left[series.index, d] = series.inverse(self.regression.remaining(self.fit, d))
-        path = states.path(reference)
-        within = np.arange(0, len(path) - 1, 1 / FINER)
-        within = within[np.diff(reference.record)[within.astype(int)] == 0]
-        finer, forces = (np.stack([np.interp(within, np.arange(len(path)), row) for row in rows.T],
-                                  axis=1) for rows in (path, left))
-        away, nearest = cKDTree(finer).query(states.path(residuals))
-        met = away < DECISIONS.reference_path * np.sqrt(path.shape[1])
-        return np.where(met[:, None], forces[nearest], 0.0)
-
-
-def _in_bands(series: DriveSeries, values: Array) -> list[Array]:
-    """Return values (M,) by octaves of frequency, the slow ones together."""
-    found, coefficients = [], series.cosines(values)
-    edges = series.frequency[-1] * 0.5 ** np.arange(1, OCTAVES)
-    of = np.searchsorted(-edges, -series.frequency)
-    for octave in range(OCTAVES):
-        full = np.zeros(len(values))
-        full[series.index] = series.inverse(np.where(of == octave, coefficients, 0.0))
-        found.append(full)
-    return found
 
 
 def _sizes(size: Array, features: Sequence[Array]) -> Array:

@@ -120,10 +120,6 @@ class Decisions:
     # The most that it is where a single run is the reference. A machine is not the same on two
     # days: 14 % of what repeats is another.
     one_run_repeats: float = 0.99
-    # Distance in positions and velocities, over their standard deviations, within which a
-    # recording is on the path of a reference. Controllers repeat a program to a hundredth; other
-    # paths seldom come as near in all drives at once.
-    reference_path: float = 0.05
     # Share of the variance of what repeats, from which a state counts as covered by a reference.
     # It says more of the force there than is left open.
     reference_known: float = 0.5
