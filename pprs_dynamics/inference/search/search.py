@@ -28,7 +28,6 @@ from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
@@ -195,8 +194,6 @@ class Search:
             if a.drive == b.drive is not None:
                 yield from self._instead(best, reduced(best, a, b), REPLACEMENTS, a.drive)
         for candidate in best.effects:
-            for shaped in self._alternatives(candidate):
-                yield exchanged(best, candidate, shaped)
             for component in candidate.components if candidate.effect.shape else ():
                 yield from self._reshaped(best, candidate, component)
             if len(candidate.components) > 1:
@@ -245,17 +242,6 @@ class Search:
         base = self.fits.at_noise_of(best, rest)
         return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
                                    drive)
-
-    def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
-        """Yield the candidate in the shapes that its own is easily taken for."""
-        effect = candidate.effect
-        if not issubclass(effect, DriveEffect) or not effect.shape:
-            return
-        shapes = [effect.alternatives(component.parameters) for component in candidate.components]
-        for number in range(min(map(len, shapes))):
-            yield EffectCandidate.of(
-                replace(component, shape=tuple(sorted(others[number].items())))
-                for component, others in zip(candidate.components, shapes, strict=True))
 
 
 def patterns_of(fits: FittedSets) -> list[DrivePatterns]:

@@ -198,11 +198,6 @@ class DriveEffect(CatalogueEffect):
         return ({},)
 
     @classmethod
-    def alternatives(cls, shape: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Return other shapes that are easily taken for this one, to be tried as well."""
-        return ()
-
-    @classmethod
     def averaged(cls, drive: DriveSamples, period: float,
                  shapes: Sequence[Mapping[str, float]]) -> Array | None:
         """Return columns of `scanned` for many shapes from means over `period`, (S, k, N).

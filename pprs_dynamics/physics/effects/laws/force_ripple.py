@@ -102,11 +102,6 @@ class ForceRipple(DriveEffect):
         return np.stack((kept * np.sin(turn), kept * np.cos(turn)), axis=1)
 
     @classmethod
-    def alternatives(cls, shape: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Return twice and half the pitch: the harmonic may be larger than the wave."""
-        return ({'pitch': 2 * shape['pitch']}, {'pitch': shape['pitch'] / 2})
-
-    @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
         """Return pitches from the stroke down to a 120th of it or 0.8 mm, evenly in stroke / p.
 
