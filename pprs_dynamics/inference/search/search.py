@@ -198,8 +198,6 @@ class Search:
                 yield from self._reshaped(best, candidate, component)
             if len(candidate.components) > 1:
                 yield from self._divided(best, candidate)
-            if len(candidate.hypotheses) > 1:
-                yield from self._as_two(best, candidate)
 
     def _reshaped(self, best: CandidateSet, candidate: EffectCandidate, component: Component,
                   ) -> Iterator[Candidates]:
@@ -209,16 +207,6 @@ class Search:
             for other in self.fits.components.local[component.drive].best_shapes(
                     base.fit, component, REPLACEMENTS):
                 yield exchanged(best, candidate, with_instead(candidate, component, other))
-
-    def _as_two(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
-        """Yield a set with two effects in the place of one that claims two things."""
-        base = self.fits.at_noise_of(best, best.without(candidate))
-        simpler = [exchanged(best, candidate, EffectCandidate.of(
-            self.fits.components.variant(component, names) for component in candidate.components))
-            for names in candidate.effect.variants
-            if len(candidate.effect.hypotheses(names)) < len(candidate.hypotheses)]
-        for part in (*self.scan.proposals(base, REPLACEMENTS), *simpler):
-            yield from self._instead(best, part, REPLACEMENTS)
 
     def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
         """Yield a set with other effects on one drive of an effect, and on all of its drives.
