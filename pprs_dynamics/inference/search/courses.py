@@ -27,7 +27,6 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
-from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 
 # Onsets that are tried, and stretches: so many parts of the recordings, each of so many of them
@@ -35,7 +34,6 @@ from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 ONSETS, STRETCHES, STRETCH_LENGTHS = 50, 40, (1, 4)
 COURSE_HALVINGS = 8  # of the step between them, around the best
 COURSE_TRIALS = 6  # candidates of a scan that are fitted
-SLOW_TRIALS = 1  # of them where the noise of the fit may hold them
 FIRST_TIMES = 5  # parts of the recordings, between which effects that are not reported are tested
 PRUNED = 6  # sets that are simplified
 MOST_COURSES = 3  # effects of one set that change within the recordings
@@ -45,9 +43,8 @@ Alone = list[tuple[CandidateSet, EffectCandidate]]
 
 @dataclass(frozen=True)
 class _Offer:
-    """A candidate with a course, the least fall of a set's deviance with it, and its drives."""
+    """A candidate with a course, the least fall of the deviance with it, and its drives."""
 
-    base: CandidateSet
     gain: float
     candidate: EffectCandidate
     drives: frozenset[int]
@@ -80,7 +77,7 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
 
     Return whether something changes.
     """
-    drives, hidden = _changing_drives(fits, reported, alone)
+    drives = _changing_drives(fits, reported, alone)
     best, alone = reported, [*alone, *_alone_on_drives(fits, drives)]
     for _ in range(MOST_COURSES if drives else 0):
         constant = [(best, candidate) for candidate in best.effects
@@ -99,7 +96,6 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
         best = found
-    best = min(best, hidden, key=lambda fitted: fitted.cost)
     if best is not reported:
         # With the times known, an effect may suffice that was not the likeliest without them.
         changing = {d for candidate in best.effects if candidate.course
@@ -111,35 +107,17 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
     return bool(drives)
 
 
-def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone,
-                     ) -> tuple[set[int], CandidateSet]:
-    """Return drives on which something may begin, end or grow, or that show a pattern.
-
-    Also the reported set, or one with an effect that begins and that slow noise hid from it.
-    """
-    def pays(offer: _Offer) -> bool:
-        assert offer.candidate.course is not None
-        return offer.gain > fits.prior_costs.of_course(offer.candidate.course)
-
+def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:
+    """Return drives on which something may begin, end or grow, or that show a pattern."""
     constant = [(reported, candidate) for candidate in reported.effects if _is_new(candidate)]
-    fast = replace(reported, fit=with_fast_noise(fits.regression, reported.fit))
-    first = [*_offers(fits, [*_bases(fits, reported), (fast, 0.0)], alone, _few_courses(fits))]
-    begun = [*_offers(fits, [(reported, 0.0)], constant, _courses(fits)),
-             *(offer for offer in first if offer.base is not fast)]
-    # What begins may be slow noise to the fit without it: the likeliest are fitted.
-    shown = {offer.candidate.name for offer in first if offer.base is fast and pays(offer)}
-    likely = sorted(filter(pays, _offers(fits, [(fast, 0.0)], [
-        pair for pair in alone if pair[1].name in shown], _courses(fits))),
-                    key=lambda offer: -offer.gain)[:SLOW_TRIALS]
-    drives = {d for unknown in reported.unknowns for d in unknown.drives} | {
-        d for offer in begun if pays(offer) for d in offer.drives}
-    hidden = reported
-    for offer in likely:
-        fitted = fits.pruned(
-            _refined(fits, fits.evaluate((*reported.candidates, offer.candidate))))
-        if fitted.cost < hidden.cost:
-            drives, hidden = drives | offer.drives, fitted
-    return drives, hidden
+    offers = [*_offers(fits, [(reported, 0.0)], constant, _courses(fits)),
+              *_offers(fits, _bases(fits, reported), alone, _few_courses(fits))]
+    drives = {d for unknown in reported.unknowns for d in unknown.drives}
+    for offer in offers:
+        assert offer.candidate.course is not None
+        if offer.gain > fits.prior_costs.of_course(offer.candidate.course):
+            drives |= offer.drives
+    return drives
 
 
 def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
@@ -235,7 +213,7 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
                 ranked = np.argsort(-gains)
                 for kind in dict.fromkeys(course.kind for course in labels):
                     at = next(k for k in ranked if labels[k].kind == kind)
-                    yield _Offer(base, float(gains[at]) - dearer,
+                    yield _Offer(float(gains[at]) - dearer,
                                  _with_course(candidate, labels[at]), frozenset(rows))
 
 
