@@ -44,17 +44,17 @@ def gain(*in_errors: float) -> PredictiveGain:
 
 
 def test_the_gain_of_one_drive_is_enough_where_no_other_loses() -> None:
-    assert gain(9.0, -0.5).confirms(2.0)
-    assert not gain(9.0, -4.0).confirms(2.0)
+    assert gain(9.0, -0.5).confirms
+    assert not gain(9.0, -4.0).confirms
     assert gain(9.0, -4.0).losing == ('slide_2',)
-    # One of six drives gains 1.5 standard errors by chance in every third recording.
-    assert gain(1.5).confirms(1.0)
-    assert not gain(1.5, -0.6, -0.6, 0.0, 0.0, 0.0).confirms(1.0)
+    # One of six drives gains 2.5 standard errors by chance in every 26th recording.
+    assert gain(2.5).confirms
+    assert not gain(2.5, -0.6, -0.6, -0.6, 0.0, 0.0).confirms
 
 
 def test_a_gain_that_is_no_number_confirms_nothing() -> None:
-    assert not gain(9.0, np.nan).confirms(1.0)
-    assert not gain(np.nan).confirms(1.0)
+    assert not gain(9.0, np.nan).confirms
+    assert not gain(np.nan).confirms
 
 
 def test_newtons_and_newton_metres_are_not_added() -> None:
@@ -68,8 +68,8 @@ def test_newtons_and_newton_metres_are_not_added() -> None:
     assert root_mean_square(after) > root_mean_square(error)
     found = predictive_gain(residuals_of(error), residuals_of(after))
     assert found.by_drive['drive_1'] > 100
-    assert found.confirms(2.0)
-    assert not predictive_gain(residuals_of(after), residuals_of(error)).confirms(2.0)
+    assert found.confirms
+    assert not predictive_gain(residuals_of(after), residuals_of(error)).confirms
 
 
 def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() -> None:
@@ -87,7 +87,7 @@ def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() ->
     assert several.objections(sure, (1.0, 1.2), 'the recordings', 'N') == ()
     said, = several.objections(unsure, (1.0, 1.2), 'the recordings', 'N')
     assert said.endswith('but weighted by the noise it falls by 0.5 standard errors, and more than '
-                         '1 are required')
+                         '2 are required')
     said, = case.objections(unsure, (1.0, 0.9), 'the recordings', 'N')
     assert 'falls from 1 N to 0.9 N, by 0.5 standard errors' in said
 
@@ -101,7 +101,7 @@ def test_a_force_that_one_model_takes_for_slow_noise_is_not_forgiven(slow: bool)
     left = scipy.signal.lfilter([1.0], [1.0, -step], rng.normal(size=(4000, 1)), axis=0)
     force = 0.03 * left / left.std()
     cured = predictive_gain(residuals_of(noise + force), residuals_of(noise))
-    assert cured.confirms(2.0)
+    assert cured.confirms
     worse = predictive_gain(residuals_of(noise), residuals_of(noise + force))
     assert worse.losing == ('drive_0',)
     assert worse.certainty == pytest.approx(-cured.certainty)

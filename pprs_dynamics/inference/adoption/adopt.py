@@ -38,12 +38,16 @@ from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import calibrations, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
-from pprs_dynamics.inference.search.held_out import PredictiveGain, hold_out, predictive_gain
+from pprs_dynamics.inference.search.held_out import (
+    SURE,
+    PredictiveGain,
+    hold_out,
+    predictive_gain,
+)
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -53,9 +57,6 @@ from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 from pprs_dynamics.system.json_records import JsonRecord
 
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
-# Standard errors by which the first effect, and further ones, must lower the held-out error.
-FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
-SURE = 2.0  # standard errors by which the error must rise without what remains in a model
 WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with --validate'
 REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
 
@@ -178,8 +179,6 @@ class _Case:
         unit : str
             Of the errors.
         """
-        asked = FURTHER_ERRORS if any(
-            isinstance(effect, CatalogueEffect) for effect in self.model.effects) else FIRST_ERRORS
         if gain is None:
             return (f'the error on {where} cannot be computed',)
         before, after = errors
@@ -187,7 +186,7 @@ class _Case:
         # Newtons and newton metres have no sum: there each drive is judged by itself.
         if self.is_alone and not after < before and unit in EFFORT_UNITS:
             return (said,)
-        if gain.confirms(asked):
+        if gain.confirms:
             return ()
         sure = gain.certainty
         link, weighted = ('but', '') if after < before else (
@@ -195,7 +194,7 @@ class _Case:
         why = (f'{link} on {listed(gain.losing)} it certainly rises' if gain.losing else
                f'{link} weighted by the noise it rises by {-sure:.2g} standard errors'
                if sure < 0 else
-               f'{weighted}by {sure:.2g} standard errors, and more than {asked:g} are required')
+               f'{weighted}by {sure:.2g} standard errors, and more than {SURE:g} are required')
         return (f'{said}, {why}',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
@@ -405,7 +404,7 @@ def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
             without_effect(answer.adopted.values, effect.name, [place]))
         less_force = design.exact_forces(answer.adopted) - design.exact_forces(less)
         without = replace(with_it, measured=answer.remaining + less_force)
-        if not predictive_gain(without, with_it).confirms(SURE):
+        if not predictive_gain(without, with_it).confirms:
             places.append(place)
     return tuple(places)
 

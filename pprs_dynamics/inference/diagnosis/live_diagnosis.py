@@ -27,9 +27,6 @@ from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.json_records import JsonRecord
 
-# Standard errors by which a change must lower the error of the next window. With ten blocks in a
-# window, 2 accept one wrong effect in 30; two windows must report it as well.
-CERTAINTY = 2.0
 # Share of a window's samples in which some drive moves, below which it is not diagnosed, and share
 # of a drive's highest speed above which it moves.
 LEAST_MOTION, MOVING = 0.2, 0.02
@@ -218,7 +215,7 @@ class LiveDiagnosis(JsonRecord):
             return False
         after, _ = measure_residuals(self.last.adopted, [recording])
         return all(
-            predictive_gain(measure_residuals(model, [recording])[0], after).confirms(CERTAINTY)
+            predictive_gain(measure_residuals(model, [recording])[0], after).confirms
             for model in (self.model, self.last.plain))
 
 

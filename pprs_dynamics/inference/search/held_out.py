@@ -23,7 +23,9 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 
 BLOCKS = 10
-SURE = 2.0  # standard errors by which a drive that loses must lose
+# Standard errors by which held-out data must be predicted better or worse. With ten blocks, one
+# wrong effect in 30 is accepted.
+SURE = 2.0
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,9 @@ class PredictiveGain:
         """The gain of all drives together in its standard errors."""
         return _in_errors(self.gains.sum(axis=1), self.sizes.sum(axis=1))
 
-    def confirms(self, errors: float) -> bool:
-        """Return whether the second model predicts better, by more than some standard errors.
+    @property
+    def confirms(self) -> bool:
+        """Whether the second model predicts better, by more than `SURE` standard errors.
 
         The gain of all drives together is enough, or that of one drive beyond `_among_drives`, if
         no other drive loses. A number that is not finite confirms nothing.
@@ -64,19 +67,20 @@ class PredictiveGain:
         found = list(self.by_drive.values())
         return bool(
             np.all(np.isfinite([self.certainty, *found])) and not self.losing
-            and (self.certainty > errors or max(found, default=0.0) > self._among_drives(errors)))
+            and (self.certainty > SURE or max(found, default=0.0) > self._among_drives))
 
     @property
     def losing(self) -> tuple[str, ...]:
         """Drives that are predicted worse, beyond the uncertainty of their gain."""
-        least = self._among_drives(SURE)
-        return tuple(drive for drive, found in self.by_drive.items() if found < -least)
+        return tuple(drive for drive, found in self.by_drive.items()
+                     if found < -self._among_drives)
 
-    def _among_drives(self, errors: float) -> float:
-        """Return what one of D drives exceeds as rarely as a single one exceeds `errors`."""
+    @property
+    def _among_drives(self) -> float:
+        """What one of D drives exceeds as rarely as a single one exceeds `SURE`."""
         from scipy.special import ndtr, ndtri  # here: a command that fits nothing starts without it
 
-        return float(-ndtri(ndtr(-errors) / max(len(self.drives), 1)))
+        return float(-ndtri(ndtr(-SURE) / max(len(self.drives), 1)))
 
 
 def _in_errors(gains: Array, sizes: Array) -> float:
