@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
 REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
-CLOSE = 1e-4  # of the reach, at which a search for a centre ends: columns move with it afterwards
-STARTS = np.vstack((np.zeros(3), np.eye(3), -np.eye(3))) / 8  # of the reach
-MOST_STEPS = 40
+# Centres that are tried: first within the reach, then around the best within this share of it,
+# until they are within 1e-4 of it. Columns move with the body afterwards.
+GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 3), axis=-1).reshape(-1, 3)
+NARROWER, ROUNDS = 0.6, 18
 PULL = 1e-3  # of the error, by which a body at that reach is pulled to its place
 
 
@@ -82,39 +83,24 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     weight = PULL * float(np.linalg.norm(reduced[:, -1]))
 
     R, y = reduced[:, :-1], reduced[:, -1]
-    found = []
-    for there in size * STARTS:
-        least, place = np.inf, there
-        for _ in range(MOST_STEPS):  # of Gauss and Newton, in mass and place
-            parameters, slopes = _point_mass(place)
-            u = R @ parameters
-            m = float(u @ y / max(float(u @ u), 1e-300))
-            residual = np.concatenate((y - m * u, -weight / size * place))
-            cost = float(residual @ residual)
-            if np.abs(place - there).max() < CLOSE * size and np.isfinite(least):
-                break
-            if cost > least:
-                place = (place + there) / 2
-                continue
-            slope = np.block([[u[:, None], m * R @ slopes],
-                              [np.zeros((3, 1)), weight / size * np.eye(3)]])
-            step = np.linalg.lstsq(slope, residual, rcond=None)[0][1:]
-            least, there, place = cost, place, np.clip(place + step, -size, size)
-        found.append((least, there.tolist()))
-    return tuple(min(found)[1])
+    place, span = np.zeros(3), size
+    for _ in range(ROUNDS):
+        tried = np.clip(place + span * GRID, -size, size)
+        forces = R @ _point_masses(tried)
+        gains = (y @ forces) ** 2 / np.maximum(np.sum(forces ** 2, axis=0), 1e-300) - (
+            weight / size) ** 2 * np.sum(tried ** 2, axis=1)
+        place, span = tried[int(np.argmax(gains))], NARROWER * span
+    return tuple(place.tolist())
 
 
-def _point_mass(place: Array) -> tuple[Array, Array]:
-    """Return mass, first moment and inertia of 1 kg at a place, (10,), and by it, (10, 3).
+def _point_masses(places: Array) -> Array:
+    """Return mass, first moments and inertia of 1 kg at places (n, 3), (10, n).
 
     In the order of `MOMENTS` and `PRODUCTS`.
     """
-    x, y, z = place
-    return (np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y,
-                      -x * y, -x * z, -y * z]),
-            np.array([[0, 1, 0, 0, 0, 2 * x, 2 * x, -y, -z, 0],
-                      [0, 0, 1, 0, 2 * y, 0, 2 * y, -x, 0, -z],
-                      [0, 0, 0, 1, 2 * z, 2 * z, 0, 0, -x, -y]]).T)
+    x, y, z = places.T
+    return np.stack((np.ones(len(places)), x, y, z, y * y + z * z, x * x + z * z, x * x + y * y,
+                     -x * y, -x * z, -y * z))
 
 
 def reach_of(robot: Mechanism) -> float:
