@@ -40,6 +40,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
@@ -93,13 +94,12 @@ def test_velocities_and_accelerations_are_those_of_the_poses(series: JointSeries
 
 # Columns and information.
 
-TERMS = (
-    FittedTerm(CATALOGUE['stribeck_friction'], 3, {'velocity': 0.02, 'exponent': 2.0}, ('force',),
-               np.array([0.5])),
-    FittedTerm(CATALOGUE['drive_spring'], 0, {}, ('stiffness', 'force'), np.array([10.0, 1.0])),
-    FittedTerm(CATALOGUE['time_delay'], 4, {'delay': 0.004}, (), np.ones(1)),
-    FittedTerm(CATALOGUE['homing_error'], 1, {}, ('zero',), np.array([0.001])),
-    FittedTerm(CATALOGUE['base_tilt'], None, {}, ('x', 'y'), np.array([0.01, 0.0])))
+TERMS = tuple(FittedTerm(Component.of(CATALOGUE[key], *of), np.array(c)) for key, *of, c in (
+    ('stribeck_friction', 3, {'velocity': 0.02, 'exponent': 2.0}, ('force',), [0.5]),
+    ('drive_spring', 0, {}, ('stiffness', 'force'), [10.0, 1.0]),
+    ('time_delay', 4, {'delay': 0.004}, (), [1.0]),
+    ('homing_error', 1, {}, ('zero',), [0.001]),
+    ('base_tilt', None, {}, ('x', 'y'), [0.01, 0.0])))
 EFFECTS = {'viscous_friction': {'lift_2.coefficient': 1.5},
            'stribeck_friction': {'slide_2.force': 0.6, 'slide_2.velocity': 0.02},
            'payload_mass': {'mass': 0.1}, 'time_delay': {'lift_3.delay': 0.003}}

@@ -247,8 +247,8 @@ def design_experiment(question: Question, motions: Motions, seed: int,
         gains = np.linalg.eigvalsh(question.precision.own(after))
         determined = int(np.sum(gains > 1)), len(gains)
     return Experiment(
-        question.kind, tuple(dict.fromkeys(term.effect.name for terms in question.subjects
-                                           for term in terms)),
+        question.kind, tuple(dict.fromkeys(
+            term.component.effect.name for terms in question.subjects for term in terms)),
         _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
         best.duration, lambda time: motions.sampled(best, time), question.information.model,
         *determined)
@@ -309,9 +309,10 @@ def _accuracies(question: Question, after: Array) -> list[Accuracy]:
 
 def _labels(term: FittedTerm, model: DriveModel) -> list[tuple[str, str, float]]:
     """Return name, unit and scale of each parameter of a term that is fitted."""
-    prefix, unit = term.effect.name, DriveUnits()
-    if term.drive is not None:
-        prefix, unit = f'{prefix}.{model.drives[term.drive]}', model.units[term.drive]
+    shape, drive = term.component.parameters, term.component.drive
+    prefix, unit = term.component.effect.name, DriveUnits()
+    if drive is not None:
+        prefix, unit = f'{prefix}.{model.drives[drive]}', model.units[drive]
     return [(f'{prefix}.{p.name}', unit.of(p.unit),
-             p.spread(1.0, term.shape[p.name]) if p.name in term.shape else p.scale)
+             p.spread(1.0, shape[p.name]) if p.name in shape else p.scale)
             for p in term.parameters]

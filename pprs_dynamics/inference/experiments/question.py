@@ -40,7 +40,7 @@ from pprs_dynamics.inference.regression.sensitivities import Sensitivities, mode
 from pprs_dynamics.inference.regression.terms import Rows
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.body_centres import about_centre
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.table import ModelTable, Rival, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
@@ -80,49 +80,41 @@ class FittedTerm:
 
     Parameters
     ----------
-    effect : type of CatalogueEffect
-    drive : int or None
-    shape : mapping of str to float
-    names : tuple of str
-        Coefficients that are fitted.
+    component : Component
     values : (k,) array
         Of the coefficients; 1 where the shape is all.
-    centre : tuple of float
-        Of an added body, about which its columns are; see `Component`.
     """
 
-    effect: type[CatalogueEffect]
-    drive: int | None
-    shape: Mapping[str, float]
-    names: tuple[str, ...]
+    component: Component
     values: Array
-    centre: tuple[float, ...] = ()
 
     @property
     def size(self) -> int:
         """Number of columns."""
-        return len(self.values) + len(self.shape)
+        return len(self.values) + len(self.component.shape)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Of the fitted columns: coefficients, then shape parameters."""
-        known = {c.name: c for c in self.effect.coefficients}
-        return (*(known[name] for name in self.names), *self.effect.shape)
+        effect, known = self.component.effect, self.component.effect.coefficients
+        return (*(c for name in self.component.names for c in known if c.name == name),
+                *effect.shape)
 
     @property
     def scales(self) -> Array:
         """Sizes at which the fitted coefficients matter; shapes by a factor of e."""
-        return np.array([p.scale for p in self.parameters[:len(self.names)]]
-                        + [1.0] * len(self.shape))
+        return np.array([p.scale for p in self.parameters[:len(self.component.names)]]
+                        + [1.0] * len(self.component.shape))
 
     def rows(self, design: Design) -> Rows:
         """Return its columns on recordings or on a motion."""
-        term = design.find_term(self.effect, self.drive, self.shape)
-        if self.centre:
-            term = about_centre(term, self.names[0], self.centre)
-        chosen = [term.names.index(name) for name in self.names] or [0]
+        c = self.component
+        term = design.find_term(c.effect, c.drive, c.parameters)
+        if c.centre:
+            term = about_centre(term, c.names[0], c.centre)
+        chosen = [term.names.index(name) for name in c.names] or [0]
         rows = {d: values[chosen] for d, values in term.rows.items()}
-        if self.shape:
+        if c.shape:
             every = np.zeros(len(term.names) or 1)
             every[chosen] = self.values
             slopes = design.slope_rows(term, every)
@@ -173,7 +165,7 @@ class Information:
         ends = dict(zip(self.terms, len(self.base) + np.cumsum(
             [term.size for term in self.terms]), strict=True))
         return tuple(int(ends[term]) - term.size + k for term in terms for k in (
-            range(len(term.values) - len(term.names), term.size) if only_fitted
+            range(len(term.values) - len(term.component.names), term.size) if only_fitted
             else range(len(term.values))))
 
     def force(self, terms: Sequence[FittedTerm]) -> Array:
@@ -232,8 +224,8 @@ class Information:
     def _sensitivities(self) -> Sensitivities:
         found = Sensitivities(self.model, self.given)
         found.is_planned = True
-        found.restrict({column.effect for column in (*self.terms, *self.base) if isinstance(
-            column, (FittedTerm, PresentParameter))}
+        found.restrict({term.component.effect for term in self.terms}
+            | {column.effect for column in self.base if isinstance(column, PresentParameter)}
             | {type(effect) for effect in self.given.effects
                if isinstance(effect, CatalogueEffect)})
         return found
@@ -451,8 +443,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
 
 def _terms(fitted: CandidateSet, candidates: Sequence[EffectCandidate]) -> tuple[FittedTerm, ...]:
     """Return effects of a set with their values."""
-    return tuple(FittedTerm(c.effect, component.drive, component.parameters, component.names,
-                            fitted.coefficients(component), component.centre)
+    return tuple(FittedTerm(component, fitted.coefficients(component))
                  for c in candidates for component in c.components)
 
 
@@ -464,7 +455,7 @@ def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm
     theirs = {d for c in truth.effects for d in c.drives or ()}
     known = {candidate.name for candidate in truth.effects}
     return tuple(
-        FittedTerm(c.effect, d, first.parameters, first.names, np.zeros(max(len(first.names), 1)))
+        FittedTerm(replace(first, drive=d), np.zeros(max(len(first.names), 1)))
         for c in fitted.effects if c.drives is not None and c.name not in known
         for first in c.components[:1] if len(fitted.blocks[first].rows) == 1
         for d in sorted(theirs - set(c.drives)))
@@ -517,17 +508,17 @@ def _common_terms(model: DriveModel) -> list[FittedTerm]:
         scale = {c.name: c.scale for c in effect.coefficients}
         if issubclass(effect, DriveEffect):
             trials = effect.trials(TYPICAL)
-            terms += [FittedTerm(effect, drive, trials[len(trials) // 3], tuple(scale),
-                                 np.array([*scale.values()] or [1.0]))
-                      for drive in range(len(model.drives))]
+            terms += [FittedTerm(
+                Component.of(effect, drive, trials[len(trials) // 3], tuple(scale)),
+                np.array([*scale.values()] or [1.0])) for drive in range(len(model.drives))]
             continue
         # In the structure once for each place, with all coefficients that it has there.
         most: dict[object, tuple[str, ...]] = {}
         for names in effect.variants:
             place = effect.places_of(names)
             most[place] = max(most.get(place, ()), names, key=len)
-        terms += [FittedTerm(effect, None, {}, names, np.array([scale[key] for key in names]))
-                  for names in most.values()]
+        terms += [FittedTerm(Component.of(effect, None, {}, names),
+                             np.array([scale[key] for key in names])) for names in most.values()]
     return terms
 
 
