@@ -73,7 +73,6 @@ SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # of the residual sine and cosine explain: by chance one in 25 000 that are tried does.
 MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
 WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
-FEW_WHOLE = 10.0  # waves over the stroke between whole numbers for a turn, for one to be meant
 
 
 @dataclass(frozen=True)
@@ -204,12 +203,10 @@ class Waves:
     numbers: Array
 
     @classmethod
-    def of(cls, residuals: Residuals, drive: int, left: Array, gear: float) -> Waves:
+    def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
         """Return those that a drive's residual, (M,), shows.
 
-        The strongest first, each with those before it. One stroke determines a number to less than
-        a wave, and where another path goes that is out of phase: what may be a whole number for
-        each turn of the motor, `gear` times the drive's, is.
+        The strongest first, each with those before it.
         """
         q, known = motion_of(residuals)[0][:, drive], np.isfinite(left)
         found, stroke = cls(drive, np.empty(0)), float(np.ptp(q))
@@ -226,9 +223,6 @@ class Waves:
             near = tried[int(np.argmax(power))] + 2 * np.pi / stroke * np.arange(
                 -WAVE_STEP, WAVE_STEP, FINE_STEP)
             at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
-            apart, whole = 2 * np.pi / stroke, gear * np.round(at / gear)
-            if abs(whole - at) < apart < gear / FEW_WHOLE:
-                at = whole
             found = cls(drive, np.append(found.numbers, at))
             features = found.known(*motion_of(residuals), residuals.period)[known]
             rest = left - features @ np.linalg.lstsq(features, left)[0]
@@ -316,7 +310,7 @@ class Reference:
         columns, base = _base(model, found, residuals.measured)
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
-        processes = _processes(residuals, columns, measured, model.gear_ratios)
+        processes = _processes(residuals, columns, measured)
         features = _features(processes, *motion_of(residuals), residuals.period)
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
         size = np.stack([fits[d][0] if d in fits else np.full(len(features[d]), LEAST_SIZE)
@@ -514,8 +508,7 @@ def _parts(residuals: Residuals) -> Integers:
     return np.minimum(np.arange(len(residuals)) * BLOCKS // len(residuals), BLOCKS - 1)
 
 
-def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               gears: Sequence[float]) -> Processes:
+def _processes(residuals: Residuals, columns: Array, measured: Sequence[int]) -> Processes:
     """Return the process over all drives, and for each drive that of its state, and waves.
 
     Waves are those of the residual.
@@ -531,7 +524,7 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
             rest = rest - np.concatenate(
                 (columns[:, d], features, own[d][1]), axis=1) @ fit.coefficients
             rest = rest - np.nanmean(rest)
-        found.append((shared, own[d][0], Waves.of(residuals, d, rest, gears[d])))
+        found.append((shared, own[d][0], Waves.of(residuals, d, rest)))
     return tuple(found)
 
 
