@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write the JSON schemas in config/schemas from the dataclasses: python docs/json_schemas.py."""
+"""Write JSON schemas and docs/json.md from the dataclasses: python docs/json_schemas.py."""
 
 from __future__ import annotations
 
@@ -9,27 +9,52 @@ import inspect
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    is_typeddict,
+)
+
+from page_block import replace_block
 
 from pprs_dynamics.app.api.adopt import AdoptionResult, AdoptionRunResult
 from pprs_dynamics.app.api.compare import ComparisonResult
 from pprs_dynamics.app.api.diagnose import DiagnosisResult
 from pprs_dynamics.app.api.fit import FitResult
 from pprs_dynamics.app.api.next_experiment import ExperimentResult
+from pprs_dynamics.app.api.simulate import SimulationResult
+from pprs_dynamics.app.commands.export import ExportJson
+from pprs_dynamics.app.commands.history import HistoryJson
+from pprs_dynamics.app.commands.info import InfoJson
+from pprs_dynamics.app.commands.init import InitJson
+from pprs_dynamics.app.commands.reproduce import ReproductionJson
+from pprs_dynamics.app.commands.survey import SurveyJson
+from pprs_dynamics.app.fleet.trend import FleetTrends
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
-from pprs_dynamics.physics.model.ledger import Step
 from pprs_dynamics.ros.node.status import NodeStatus
 from pprs_dynamics.system.json_records import JsonRecord
 
 FOLDER = Path(__file__).parents[1] / 'config' / 'schemas'
+PAGE = Path(__file__).parent / 'json.md'
+BEGIN, END = '<!-- keys: written by docs/json_schemas.py -->', '<!-- end of keys -->'
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
-# File of a schema: its record, and the fields of other commands that hold one.
-RECORDS: dict[str, type[JsonRecord]] = {
-    'adopt': AdoptionResult, 'adopt_all': AdoptionRunResult, 'compare': ComparisonResult,
-    'diagnose': DiagnosisResult, 'diagnosis': LiveDiagnosis, 'fit': FitResult,
-    'history_step': Step, 'next_experiment': ExperimentResult, 'status': NodeStatus}
+# What writes the JSON: a command, `diagnose --adopt-all` under `adoption`, or a topic of a node.
+RECORDS: dict[str, type] = {
+    'init': InitJson, 'info': InfoJson, 'fit': FitResult, 'compare': ComparisonResult,
+    'diagnose': DiagnosisResult, 'adopt_all': AdoptionRunResult, 'adopt': AdoptionResult,
+    'history': HistoryJson, 'next_experiment': ExperimentResult, 'simulate': SimulationResult,
+    'export': ExportJson, 'survey': SurveyJson, 'trend': FleetTrends,
+    'reproduce': ReproductionJson, 'diagnosis': LiveDiagnosis, 'status': NodeStatus}
+HEADINGS = {'adopt_all': '`pprs diagnose --adopt-all`, under `adoption`',
+            'diagnosis': '`~/diagnosis`: keys of `pprs diagnose`, and', 'status': '`~/status`'}
 PLAIN = {str: 'string', bool: 'boolean', int: 'integer', NoneType: 'null'}
 
 Schema = dict[str, Any]
@@ -57,22 +82,38 @@ def attribute(record: type, name: str) -> tuple[Any, str]:
     return get_type_hints(record, include_extras=True)[name], described(record).get(name, '')
 
 
-def keys_of(record: type[JsonRecord], parts: dict[str, Schema]) -> tuple[Schema, list[str]]:
+def is_record(kind: Any) -> bool:
+    """Return whether a type has keys of its own."""
+    return isinstance(kind, type) and (
+        issubclass(kind, JsonRecord) or is_dataclass(kind) or is_typeddict(kind))
+
+
+def keys_of(record: type, parts: dict[str, Schema]) -> tuple[Schema, list[str]]:
     """Return properties and required keys of a record."""
+    if not issubclass(record, JsonRecord):
+        names = get_type_hints(record)
+        return {name: described_schema(record, name, parts) for name in names}, list(names)
     properties: Schema = {}
     required: list[str] = []
-    for key, name, may_be_absent in record.json_entries():
-        kind, text = attribute(record, name)
-        if key.startswith('**'):
-            inner = get_args(kind)[1] if get_origin(kind) is Annotated else kind
-            more, needed = keys_of(inner, parts)
-            properties.update(more)
-            required += needed if inner is kind else []
-            continue
-        schema = schema_of(kind, parts)
-        properties[key] = {**schema, 'description': ' '.join(text.split())} if text else schema
-        required = [each for each in required if each != key] + [key] * (not may_be_absent)
+    if record.json_of:
+        kind, _ = attribute(record, record.json_of)
+        inner = get_args(kind)[1] if get_origin(kind) is Annotated else kind
+        properties, required = keys_of(inner, parts)
+        required = required if inner is kind else []
+    for key in record.own_keys():
+        name = dict(record.json_attributes).get(key, key)
+        properties[key] = described_schema(record, name, parts)
+        required = [each for each in required if each != key]
+        required += [key] if key not in record.json_optional else []
     return properties, required
+
+
+def described_schema(record: type, name: str, parts: dict[str, Schema]) -> Schema:
+    """Return the schema of a field or property, with its description."""
+    kind, text = attribute(record, name)
+    schema = schema_of(kind, parts)
+    text = re.sub(r'\b(None|NaN)\b', 'null', ' '.join(text.split()))
+    return {**schema, 'description': text} if text else schema
 
 
 def schema_of(kind: Any, parts: dict[str, Schema]) -> Schema:
@@ -86,7 +127,7 @@ def schema_of(kind: Any, parts: dict[str, Schema]) -> Schema:
         return {'enum': list(inner)}
     if origin in (Union, UnionType):
         return union([schema_of(each, parts) for each in inner])
-    if isinstance(kind, type) and issubclass(kind, JsonRecord):
+    if is_record(kind):
         if kind.__name__ not in parts:
             parts[kind.__name__] = {}  # a record may hold others of its kind
             parts[kind.__name__] = record_schema(kind, parts)
@@ -114,10 +155,11 @@ def union(schemas: list[Schema]) -> Schema:
     return {'anyOf': schemas}
 
 
-def record_schema(record: type[JsonRecord], parts: dict[str, Schema]) -> Schema:
+def record_schema(record: type, parts: dict[str, Schema]) -> Schema:
     """Return the schema of a record."""
     properties, required = keys_of(record, parts)
-    return {'type': 'object', 'properties': properties, 'required': required}
+    return {'description': (inspect.getdoc(record) or '').partition('\n')[0],
+            'type': 'object', 'properties': properties, 'required': required}
 
 
 def texts() -> dict[Path, str]:
@@ -125,8 +167,7 @@ def texts() -> dict[Path, str]:
     found = {}
     for name, record in RECORDS.items():
         parts: dict[str, Schema] = {}
-        schema = {'$schema': DIALECT, 'title': (inspect.getdoc(record) or '').partition('\n')[0],
-                  **record_schema(record, parts)}
+        schema = {'$schema': DIALECT, **record_schema(record, parts)}
         if parts:
             schema['$defs'] = parts
         found[FOLDER / f'{name}.schema.json'] = json.dumps(
@@ -134,6 +175,36 @@ def texts() -> dict[Path, str]:
     return found
 
 
+def section(heading: str, schema: Schema, other: Schema | None = None) -> str:
+    """Return description and keys of a schema; without the keys that another schema has, too."""
+    known = other['properties'] if other else {}
+    described: dict[tuple[str, str], list[str]] = {}
+    for key, content in schema['properties'].items():
+        if known.get(key) == content:
+            continue
+        named = re.findall(r"'#/\$defs/(\w+)'", str(content))
+        where = ', '.join(f'[{name}](#{name.lower()})' for name in named)
+        described.setdefault((content.get('description', ''), where), []).append(f'`{key}`')
+    lines = [f'| {", ".join(keys)} | {" ".join(filter(None, (text, where)))} |'
+             for (text, where), keys in described.items()]
+    return '\n'.join([f'## {heading}', '', schema['description'], '', '| key | content |',
+                      '|---|---|', *lines])
+
+
+def table() -> str:
+    """Return a section for each command and node, then one for each record in them, in Markdown."""
+    schemas = {name: json.loads(text) for name, text in zip(RECORDS, texts().values(), strict=True)}
+    shared = {name: part for schema in schemas.values()
+              for name, part in sorted(schema.get('$defs', {}).items())}
+    sections = [section(HEADINGS.get(name, f'`pprs {name.replace("_", "-")}`'), schema,
+                        schemas['diagnose'] if name == 'diagnosis' else None)
+                for name, schema in schemas.items()]
+    sections += [section(name, part, shared['FoundEffect'] if name == 'LiveEffect' else None)
+                 for name, part in shared.items() if name != 'Adoption']
+    return '\n\n'.join(sections).replace('(#adoption)', '(#pprs-adopt)')
+
+
 if __name__ == '__main__':
     for file, text in texts().items():
         file.write_text(text, encoding='utf-8')
+    replace_block(PAGE, BEGIN, END, table())

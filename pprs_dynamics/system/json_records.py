@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar
 
 from pprs_dynamics.system.plain_text import displayed
@@ -15,50 +15,51 @@ EMPTY: tuple[Any, ...] = (None, '', (), {})
 
 
 class JsonRecord:
-    """A dataclass that is written as JSON.
+    """A dataclass whose JSON has other keys than its fields.
 
     Class attributes
     ----------------
     json_keys : tuple of str
-        Each key is the name of a field or property. `key=name` is written under another name than
-        it has here, `key?` is left out where it is empty, `**name` adds the keys of another
-        record, and `*` or `*?` those of all fields. The default is `*`.
+        Keys, each the name of a field or property; none given: all fields.
+    json_attributes : tuple of (str, str)
+        Keys whose field or property has another name, and that name.
+    json_optional : tuple of str
+        Keys that are left out where they are empty.
+    json_of : str
+        Field or property whose keys come first; '' for none. Without `json_keys` it is all.
     """
 
-    json_keys: ClassVar[tuple[str, ...]] = ('*',)
+    json_keys: ClassVar[tuple[str, ...]] = ()
+    json_attributes: ClassVar[tuple[tuple[str, str], ...]] = ()
+    json_optional: ClassVar[tuple[str, ...]] = ()
+    json_of: ClassVar[str] = ''
 
     @classmethod
-    def json_entries(cls) -> Iterator[tuple[str, str, bool]]:
-        """Yield key, name of the attribute, and whether it may be absent."""
-        for entry in cls.json_keys:
-            if entry in ('*', '*?'):
-                names = [each.name for each in fields(cls)]  # type: ignore[arg-type]
-                yield from ((name, name, entry.endswith('?')) for name in names)
-            else:
-                key, _, name = entry.partition('=')
-                yield key.rstrip('?'), (name or key).strip('*?'), key.endswith('?')
+    def own_keys(cls) -> tuple[str, ...]:
+        """Return the keys of the JSON without those of `json_of`."""
+        if cls.json_keys or cls.json_of:
+            return cls.json_keys
+        return tuple(field.name for field in fields(cls))  # type: ignore[arg-type]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        content: dict[str, Any] = {}
-        for key, name, may_be_absent in self.json_entries():
-            value = getattr(self, name)
-            if key.startswith('**'):
-                content.update(for_json(value))
-            elif not (may_be_absent and value in EMPTY):
+        content = dict(for_json(getattr(self, self.json_of))) if self.json_of else {}
+        for key in self.own_keys():
+            value = getattr(self, dict(self.json_attributes).get(key, key))
+            if key not in self.json_optional or value not in EMPTY:
                 content[key] = for_json(value)
         return content
 
 
 def for_json(content: Any) -> Any:
-    """Return what JSON can hold: text as `displayed`, None for numbers that are not finite.
+    """Return what JSON can contain: text as `displayed`, None for numbers that are not finite.
 
-    Of what has a method `to_dict` the result of that.
+    Objects with a method `to_dict` and dataclasses become dictionaries.
     """
-    if isinstance(content, JsonRecord):
-        return content.to_dict()
     if hasattr(content, 'to_dict'):
-        return for_json(content.to_dict())
+        return content.to_dict() if isinstance(content, JsonRecord) else for_json(content.to_dict())
+    if is_dataclass(content):
+        return {each.name: for_json(getattr(content, each.name)) for each in fields(content)}
     if isinstance(content, Mapping):
         return {displayed(key): for_json(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):

@@ -179,7 +179,7 @@ def test_reproduce_writes_figures_curves_and_claims(reproduced: Path) -> None:
     output = reproduced / 'new' / 'output'
     for name in ('figure_8.png', 'figure_9.png'):
         assert min(png_size(output / name)) > 400
-    content = json.loads((reproduced / 'result.json').read_text())
+    content = checked((reproduced / 'result.json').read_text(), 'reproduce')
     assert content == json.loads((output / 'claims.json').read_text())
     for claim in content['claims']:
         assert set(claim) == {'claim', 'paper', 'found', 'reproduced'}

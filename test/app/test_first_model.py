@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from documents import checked
 from made_up_recordings import DYNAMIC, STORE, header, states_of, write_plain_bag
 from scipy.io import savemat
 
@@ -330,7 +331,7 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     said = ' '.join(capsys.readouterr().out.split())
     assert '800 of 800 samples' in said
     assert 'pprs fit run.csv --model robot.yaml --output base.yaml' in said
-    assert json.loads((tmp_path / 'x.json').read_text())['drives'] == list(JOINTS)
+    assert checked((tmp_path / 'x.json').read_text(), 'init')['drives'] == list(JOINTS)
     before = (tmp_path / 'robot.yaml').read_text()
     assert 'guessed: no header: columns 2 to 4 taken as positions' in before
     assert main(['info', 'run.csv', '--model', 'robot.yaml']) == 0

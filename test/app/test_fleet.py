@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
+from documents import checked
 from workbench_bench import AXIS, write_axis
 
 from pprs_dynamics.app.commands.pprs import main
@@ -52,7 +52,7 @@ def test_a_step_has_its_date_and_size() -> None:
         value = np.random.default_rng(seed).normal(scale=0.1, size=DAYS)
         value[20:] += 0.8
         (step,) = find_steps(days(DAYS), value, 100)
-        assert step.time == FIRST + pandas.Timedelta(days=20)
+        assert step.time == (FIRST + pandas.Timedelta(days=20)).isoformat()
         assert abs(step.after - step.before - 0.8) < 4 * step.std < 0.4
 
 
@@ -81,7 +81,7 @@ def test_the_robot_that_changed_is_reported_on_page_and_in_json(
     write_rows(store, 'bad', [{'path': 'bad.csv', 'robot': 'quiet', 'error': 'no header'}])
     assert main(['trend', str(store), '--json', str(tmp_path / 'x.json'),
                  '--report', str(tmp_path / 'x.html')]) == 0
-    content = json.loads((tmp_path / 'x.json').read_text())
+    content = checked((tmp_path / 'x.json').read_text(), 'trend')
     (change,) = content['changes']
     assert (change['robot'], change['drive'], change['parameter']) == ('<b>', 'slide_2', 'force')
     assert change['steps'][0]['time'].startswith('2026-03-11')
@@ -133,7 +133,7 @@ def test_a_survey_writes_documented_columns_and_does_nothing_twice(
     command = ['survey', str(tmp_path / 'robot_1'), '--model', MODEL, '--effects', EFFECTS,
                '--output', str(store), '--workers', '1', '--json', str(summary)]
     assert main(command) == 0
-    assert json.loads(summary.read_text())['done'] == 3
+    assert checked(summary.read_text(), 'survey')['done'] == 3
     assert main(command) == 0
     assert '0 done, 4 done before' in ' '.join(capsys.readouterr().out.split())
     rows = pandas.read_parquet(store)

@@ -49,7 +49,7 @@ def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Pa
     for key in ('friction.viscous', 'friction.coulomb'):
         assert fit.model.values[key] == pytest.approx(arm.FRICTION[key], rel=0.03)
     assert max(fit.held_out.values()) < 1.1 * NOISE
-    assert min(fit.before.values()) > 5 * NOISE
+    assert min(fit.error_before.values()) > 5 * NOISE
 
 
 def test_a_slide_of_init_is_fitted_as_well_and_diagnosed_without_another_fit(

@@ -253,7 +253,7 @@ def test_an_effect_that_raises_the_error_of_held_out_recordings_is_unknown() -> 
     (refuted,) = found.unconfirmed
     assert refuted.name == 'coulomb_friction'
     assert refuted.held_out_after > refuted.held_out_before
-    assert refuted.certainty < -2
+    assert refuted.held_out_certainty < -2
     assert 'predicted worse with it, by' in refuted.objection
     # The model that is handed on does not have it.
     assert found.adopted.values['effects.active'] == []

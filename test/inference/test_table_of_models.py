@@ -202,23 +202,23 @@ def adequate() -> Diagnosis:
         'viscous_friction', 'effort_offset'))])
 def test_an_effect_of_twice_the_size_is_seen_and_one_of_a_quarter_is_not(
         name: str, adequate: Diagnosis) -> None:
-    size = next(limit.size for limit in adequate.detectable if limit.effect.name == name)
+    size = next(limit.size for limit in adequate.detectable if limit.name == name)
     for seed in (2, 3):
         assert told(seed, name, 2 * size).verdict != 'adequate'
         assert told(seed, name, size / 4).verdict == 'adequate'
 
 
 def test_more_noise_hides_more(adequate: Diagnosis) -> None:
-    loud = {limit.effect.name: limit.size for limit in told(5, noise=0.7).detectable}
-    quiet = {limit.effect.name: limit.size for limit in adequate.detectable}
+    loud = {limit.name: limit.size for limit in told(5, noise=0.7).detectable}
+    quiet = {limit.name: limit.size for limit in adequate.detectable}
     for name in ('drive_inertia', 'coulomb_friction'):
         assert loud[name] > 1.5 * quiet[name]
 
 
 def test_what_was_found_or_is_in_the_model_is_not_listed(adequate: Diagnosis) -> None:
-    size = next(d.size for d in adequate.detectable if d.effect.name == 'viscous_friction')
+    size = next(d.size for d in adequate.detectable if d.name == 'viscous_friction')
     found = told(2, 'viscous_friction', 20 * size)
     assert [e.name for e in found.effects] == ['viscous_friction']
-    names = {limit.effect.name for limit in found.detectable}
+    names = {limit.name for limit in found.detectable}
     assert 'viscous_friction' not in names
     assert 'drive_inertia' in names

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from documents import checked
 from single_axis import axis_values
 
 from pprs_dynamics import DriveModel
@@ -56,7 +56,7 @@ def exported(model: str | Path, kind: str, folder: Path, *more: str) -> tuple[Pa
     file, result = folder / f'robot.{"urdf" if kind == URDF else "xml"}', folder / 'result.json'
     assert main(['export', str(model), '--to', kind, '--output', str(file), '--json', str(result),
                  *more]) == 0
-    return file, json.loads(result.read_text())
+    return file, checked(result.read_text(), 'export')
 
 
 def paper(**changes: Any) -> DriveModel:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
+from documents import checked
 from model_recordings import with_effects
 from planar_arm import planar_arm
 
@@ -138,7 +138,7 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     output, truth = str(tmp_path / 'run.csv'), tmp_path / 'truth.json'
     assert main(['simulate', '--model', path, '--output', output, '--effect', 'payload_mass',
                  '--duration', '5', '--json', str(truth)]) == 0
-    assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
+    assert checked(truth.read_text(), 'simulate')['effects'][0]['parameters']['mass'] > 0
     assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
                  'joint_spring']) == 2
     assert 'needs a passive joint' in capsys.readouterr().err

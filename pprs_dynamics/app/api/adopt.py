@@ -77,7 +77,7 @@ class RefusedError(PprsError, ValueError):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AdoptionResult(Result):
-    """What `pprs adopt` says.
+    """Result of `pprs adopt`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class AdoptionResult(Result):
     """
 
     rows = 'parameters'  # what `table` shows
-    json_keys = ('**adoption',)
+    json_of = 'adoption'
     inputs: Inputs
     adoption: Adoption
 
@@ -211,7 +211,7 @@ class AdoptionResult(Result):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AdoptionRunResult(Result):
-    """What `pprs diagnose --adopt-all` says.
+    """Result of `pprs diagnose --adopt-all`.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ class AdoptionRunResult(Result):
     """
 
     rows = 'steps'  # what `table` shows
-    json_keys = ('**run',)
+    json_of = 'run'
     inputs: Inputs
     run: AdoptionRun
 

@@ -37,7 +37,7 @@ COLOURS = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ComparisonResult(Result):
-    """What `pprs compare` says.
+    """Result of `pprs compare`.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ class ComparisonResult(Result):
         How it was computed.
     """
 
-    json_keys = ('**comparison', 'verdict', 'effort_looks_like')
+    json_of = 'comparison'
+    json_keys = ('verdict', 'effort_looks_like')
 
     inputs: Inputs
     residuals: Residuals

@@ -25,7 +25,7 @@ from pprs_dynamics.app.report.terminal import (
     titled_table,
     verdict_panel,
 )
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
@@ -43,6 +43,7 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     detectable_rows,
     fitted_values,
     is_refit,
+    largest_fall,
     runner_up,
     set_rows,
     unexplained_groups,
@@ -59,6 +60,9 @@ if TYPE_CHECKING:
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_EFFECTS = 4  # rows and values without --details
 MOST_PLACES = 2  # of an unexplained error without --details
+HEADINGS = 'effect', 'on', 'error', 'held out [std]', 'evidence'
+CAPTION = ('Effects, largest error reduction first. Error: on the drive where it falls most. '
+           'Held out: standard errors by which held-out data are predicted better.')
 REFIT = 'model numbers'  # refitted together with the effects
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
@@ -121,7 +125,7 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield every effect, finding, table and list."""
     if diagnosis.effects:
-        yield f'[bold]{escape(_held_out(diagnosis))}[/]'
+        yield f'[bold]{CAPTION}[/]'
         yield _effects_table(diagnosis, effect_rows(diagnosis), frame='head')
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield f'[bold]{number}. {escape(finding.title)}[/]'
@@ -138,7 +142,7 @@ def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 
 
 def _effects_table(diagnosis: Diagnosis, rows: Sequence[Sequence[str]], **options: Any) -> Any:
-    return text_table(*plain_rows((_headings(diagnosis), rows)), right=(2, 3, 4),
+    return text_table(*plain_rows((HEADINGS, rows)), right=(2, 3, 4),
                       whole=(0, 2, 3, 4), **options)
 
 
@@ -159,7 +163,7 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
                 [(candidate.name, f'{candidate.evidence:.0f}', plain(candidate.error_after),
-                  sites(candidate.names[0][1], diagnosis)) for candidate in diagnosis.candidates]))
+                  sites(candidate.drives, diagnosis)) for candidate in diagnosis.candidates]))
 
 
 def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
@@ -170,34 +174,28 @@ def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
 
 
 def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
-    return [('Suspects: slow noise explains the data as well', words.suspects),
+    return [('Suspects: effects that cost little more than they explain', words.suspects),
             ('Excluded sets', words.barred),
             ('Calibrated numbers of the model', words.calibrated)]
-
-
-def _held_out(diagnosis: Diagnosis) -> str:
-    data = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
-            else 'blocks of the same recordings')
-    return ('Effects, largest error reduction first. Held out: error on '
-            f'{data}, of the model refitted without and with the effect')
-
-
-def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
-    unit = diagnosis.residuals.unit
-    return ('effect', 'on', f'error [{unit}]', f'held out [{unit}]', 'evidence')
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """Return a row for each reported effect, and one for the model's numbers if they matter."""
     rows: list[tuple[str, ...]] = [
         (effect.name, sites(effect.drives, diagnosis, effect.places),
-         fall(effect.error_before, effect.error_after),
-         fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+         _fall(diagnosis, diagnosis.remaining + effect.force, diagnosis.remaining),
+         plain(effect.held_out_certainty, 2), f'{effect.evidence:.0f}')
         for effect in diagnosis.effects]
     if is_refit(diagnosis):
-        given = root_mean_square(diagnosis.residuals.error)
-        rows.append((REFIT, '', fall(given, diagnosis.refit), '', ''))
+        refit = sum((effect.force for effect in diagnosis.effects), diagnosis.remaining)
+        rows.append((REFIT, '', _fall(diagnosis, diagnosis.residuals.error, refit), '', ''))
     return rows
+
+
+def _fall(diagnosis: Diagnosis, error: Array, less: Array) -> str:
+    """Return 'slide_1 0.172 → 0.0145 N', see `largest_fall`."""
+    drive, *errors = largest_fall(diagnosis, error, less)
+    return f'{drive} {fall(*errors)} {diagnosis.residuals.units_of(drive).effort}'
 
 
 def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
@@ -272,8 +270,8 @@ def diagnosis_page(
     _unexplained(page, diagnosis, words)
     if diagnosis.effects:
         with page.fold('Contribution of each effect'):
-            page.table(_headings(diagnosis), effect_rows(diagnosis),
-                       caption=f'{_held_out(diagnosis)}.')
+            page.table(HEADINGS, effect_rows(diagnosis),
+                       caption=CAPTION)
             figures.add_contributions(page, diagnosis.residuals, {
                 effect.name: effect.force for effect in diagnosis.effects},
                 'Contribution of each effect.')
@@ -353,7 +351,7 @@ def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class DiagnosisResult(Result):
-    """What `pprs diagnose` says.
+    """Result of `pprs diagnose`.
 
     Parameters
     ----------
@@ -363,7 +361,7 @@ class DiagnosisResult(Result):
         The answer with all that it was decided from.
     """
 
-    json_keys = ('**diagnosis',)
+    json_of = 'diagnosis'
 
     inputs: Inputs
     diagnosis: Diagnosis

@@ -38,7 +38,7 @@ HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
 
 @dataclass(frozen=True, repr=False, eq=False)
 class FitResult(Result):
-    """What `pprs fit` says.
+    """Result of `pprs fit`.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class FitResult(Result):
     """
 
     rows = 'numbers'  # what `table` shows
-    json_keys = ('**fit',)
+    json_of = 'fit'
     inputs: Inputs
     fit: BaseFit
 
@@ -78,9 +78,10 @@ class FitResult(Result):
         """Drives, units, errors before, after and held out."""
         fit, model = self.fit, self.inputs.model
         return ('drive', 'unit', 'before', 'after', 'held out'), [
-            (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
+            (drive, unit.effort, plain(fit.error_before[drive]), plain(fit.error_after[drive]),
              plain(fit.held_out[drive]) if drive in fit.held_out else '')
-            for drive, unit in zip(model.drives, model.units, strict=True) if drive in fit.after]
+            for drive, unit in zip(model.drives, model.units, strict=True)
+            if drive in fit.error_after]
 
     @property
     def _numbers(self) -> PlainTable:
@@ -103,8 +104,8 @@ class FitResult(Result):
         if self._headline:
             page.text(sentence(self._headline), 'lead')
         page.sources(self.inputs.model.source, *self.inputs.names)
-        page.errors([ErrorRow(name, self.fit.before[name], after)
-                     for name, after in self.fit.after.items()],
+        page.errors([ErrorRow(name, self.fit.error_before[name], after)
+                     for name, after in self.fit.error_after.items()],
                     'Error, rms, before (grey) and with the fitted numbers (blue).')
         page.table(*self._errors)
         page.text(f'Held out: {HELD_OUT[self.fit.held_out_on]}.', 'note')
@@ -115,7 +116,7 @@ class FitResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""
-        return plot_errors({'before': self.fit.before, 'after': self.fit.after,
+        return plot_errors({'before': self.fit.error_before, 'after': self.fit.error_after,
                             'held out': self.fit.held_out},
                            common_effort(self.inputs.model.units))
 

@@ -57,7 +57,7 @@ def drive_rows(experiment: Experiment, motion: Motion) -> Rows:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ExperimentResult(Result):
-    """What `pprs next-experiment` designs.
+    """Result of `pprs next-experiment`.
 
     Parameters
     ----------
@@ -68,14 +68,16 @@ class ExperimentResult(Result):
     motion : PlatformMotion or JointMotion
         Sampled.
     purpose : {'separate', 'commission'}
+        Option of the command.
     seed : int
-        Of the search.
+        Seed of the search.
     rate : float
-        Of the samples [Hz].
+        Rate of the samples [Hz].
     """
 
     rows = 'contests'  # what `table` shows
-    json_keys = ('**design', 'purpose', 'seed', 'rate')
+    json_of = 'design'
+    json_keys = ('purpose', 'seed', 'rate')
     inputs: Inputs
     design: Experiment
     motion: PlatformMotion | JointMotion

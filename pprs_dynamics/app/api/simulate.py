@@ -34,7 +34,7 @@ RATE = 500.0  # [Hz], of the 3-PPRS
 
 @dataclass(frozen=True, repr=False, eq=False)
 class SimulationResult(Result):
-    """What `pprs simulate` makes.
+    """Result of `pprs simulate`.
 
     Parameters
     ----------
@@ -42,12 +42,13 @@ class SimulationResult(Result):
     recording : Recording
         What the sensors said.
     effects : tuple of dict
-        What was hidden: name, drives and parameters of each effect.
+        Hidden effects: name, drives and parameters of each.
     motion : PlatformMotion or JointMotion
         Where the robot was meant to go.
     rate : float
-        Of the samples [Hz].
+        Rate of the samples [Hz].
     seed : int
+        Seed of noise and effects.
     """
 
     json_keys = ('samples', 'rate', 'seed', 'effects')

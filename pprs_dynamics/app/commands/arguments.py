@@ -236,13 +236,10 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
 
 
 def show(result: Result, options: argparse.Namespace, screen: Any,
-         page: Callable[[], Page] | None = None, view: Any = None, **beside: str) -> None:
-    """Print a result, and write what --json and --report ask for: its view and page by default.
-
-    What else is given stands in the JSON, too.
-    """
+         page: Callable[[], Page] | None = None, view: Any = None) -> None:
+    """Print a result, and write what --json and --report ask for: its view and page by default."""
     if options.json:
-        write_json(options.json, {**result.to_dict(), **beside})
+        write_json(options.json, result)
     if getattr(options, 'report', None):
         with staged_bar(screen) as progress:
             progress('page', 0.0)

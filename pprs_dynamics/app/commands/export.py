@@ -11,10 +11,11 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from pprs_dynamics.app.commands.arguments import UsageError, output_file, write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.simulation.export.exported_robot import (
@@ -32,6 +33,22 @@ ENDINGS = {URDF: ('.urdf',), MJCF: ('.xml', '.mjcf')}
 FEW = 8  # names that the terminal lists
 
 EXAMPLE = 'pprs export better.yaml --to mjcf --output better.xml'
+
+
+class ExportJson(TypedDict):
+    """A model in the format of another program.
+
+    Parameters
+    ----------
+    not_expressed : list of str
+        Parts of the model that the format cannot express.
+    replay_error, effort : float
+        RMS, over all drives, of the file's effort errors and of the model's efforts [N, N m].
+    """
+
+    not_expressed: list[str]
+    replay_error: float
+    effort: float
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,9 +77,9 @@ def run(options: argparse.Namespace) -> int:
     found = replay(model, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
-        write_json(options.json, {'format': options.to, 'output': options.output,
-                                  'not_expressed': list(robot.not_expressed),
-                                  **found.to_dict()})
+        write_json(options.json, ExportJson(
+            not_expressed=list(robot.not_expressed), replay_error=root_mean_square(found.error),
+            effort=root_mean_square(found.effort)))
     _print_summary(screen, model, found, robot.not_expressed)
     screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0

@@ -8,16 +8,23 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TypedDict
 
 from pprs_dynamics.app.commands.arguments import add_shared, require_output, write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
+from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 
 EXAMPLE = 'pprs history better.yaml --report history.html'
+
+
+class HistoryJson(TypedDict):
+    """The steps of a model's history, oldest first."""
+
+    steps: list[Step]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         return 1
     screen.print(history_view(steps, unit))
     if options.json:
-        write_json(options.json, {'steps': [step.to_dict() for step in steps]})
+        write_json(options.json, HistoryJson(steps=steps))
     if options.report:
         page = history_page(Path(options.file).name, steps, unit)
         screen.print(f'page: {shown(page.write(options.report))}', soft_wrap=True)

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any
+from typing import Any, TypedDict
 
 from pprs_dynamics.app.api.inputs import read_checked
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
@@ -24,6 +23,50 @@ from pprs_dynamics.system.plain_text import counted
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
 
+class MechanismJson(TypedDict):
+    """Bodies, joints and loops of an arm or a robot with loops.
+
+    Parameters
+    ----------
+    bodies : dict of str to float
+        Mass of each link that has one [kg].
+    joints : dict of str to str
+        Role of each joint: driven, held or passive.
+    loops : dict of str to str
+        Kind of each joint that closes a loop.
+    drives : list of str
+        Driven joints, in the order of all results.
+    degrees_of_freedom : int
+        At home.
+    condition_number : float
+        Of the closures at home.
+    """
+
+    bodies: dict[str, float]
+    joints: dict[str, str]
+    loops: dict[str, str]
+    drives: list[str]
+    degrees_of_freedom: int
+    condition_number: float
+
+
+class InfoJson(TypedDict):
+    """What recordings and a robot contain.
+
+    Parameters
+    ----------
+    robot : MechanismJson
+        Of an arm or a robot with loops, else null.
+    recordings : list of Summary
+    effort_looks_like : dict
+        Kind of each drive's effort that is no measurement; null for none.
+    """
+
+    robot: MechanismJson | None
+    recordings: list[Summary]
+    effort_looks_like: dict[str, str] | None
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_shared(parser, 'recordings', 'topic', 'report', required=False,
@@ -34,9 +77,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = DriveModel.load(options.model)
-    content: dict[str, Any] = {}
     if model.is_mechanism:
-        content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
         description = model.robot.structure.description
@@ -52,10 +93,10 @@ def run(options: argparse.Namespace) -> int:
         recording_page(recordings[0], model.units).write(options.report)
         screen.print(f'page: {shown(options.report)}', soft_wrap=True)
     if options.json:
-        write_json(options.json, {
-            **content,
-            'effort_looks_like': effort_looks_like(summary.findings for summary in summaries),
-            'recordings': [asdict(summary) for summary in summaries]})
+        write_json(options.json, InfoJson(
+            robot=describe_mechanism(model) if model.is_mechanism else None,
+            recordings=summaries,
+            effort_looks_like=effort_looks_like(summary.findings for summary in summaries)))
     return 0
 
 
@@ -115,7 +156,7 @@ def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
 
 
-def describe_mechanism(model: DriveModel) -> dict[str, Any]:
+def describe_mechanism(model: DriveModel) -> MechanismJson:
     """Return bodies, joints, loops, mobility and conditioning, for JSON."""
     s = model.robot.structure
 
@@ -123,12 +164,9 @@ def describe_mechanism(model: DriveModel) -> dict[str, Any]:
         c = int(s.tables.coordinate[row])
         return 'driven' if c in s.tables.drives else 'held' if c in s.mobility.held else 'passive'
     return {
-        'bodies': [{'link': link, 'mass': float(mass)} for link, mass in zip(
-            model.robot.body_names, model.robot.masses, strict=True)],
-        'joints': [{'name': name, 'kind': s.description.joints[name].kind, 'role': role(row)}
-                   for name, row in s.rows.items()],
-        'loops': [{'name': loop.name, 'type': loop.kind, 'a': loop.a, 'b': loop.b}
-                  for loop in s.loops],
+        'bodies': dict(zip(model.robot.body_names, model.robot.masses.tolist(), strict=True)),
+        'joints': {name: role(row) for name, row in s.rows.items()},
+        'loops': {loop.name: loop.kind for loop in s.loops},
         'drives': list(s.drives), 'degrees_of_freedom': s.mobility.freedoms,
         'condition_number': s.mobility.condition}
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import asdict
 from shlex import quote
+from typing import TypedDict
 
 from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
@@ -17,6 +17,7 @@ from pprs_dynamics.app.report.charts import recording_rows
 from pprs_dynamics.app.report.pictures import plot_over_time, save
 from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.inference.diagnosis.next_step import SECOND
+from pprs_dynamics.measurement.files.recording import Summary
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -24,6 +25,26 @@ EXAMPLE = 'pprs init ur10e.urdf run.csv --output robot.yaml'
 FASTEST = 1e6  # [Hz]
 NOT_SURE = ('[bold]Not sure[/]: the lines are comments in the model file; write what is true, or '
             'go on with --as-it-is')
+
+
+class InitJson(TypedDict):
+    """A new model file.
+
+    Parameters
+    ----------
+    notes : list of str
+        What was guessed, and what is not known.
+    drives : list of str
+        Driven joints.
+    recordings : list of Summary
+    questions : list of str
+        Lines of the model file of which one is true, where two readings are possible.
+    """
+
+    notes: list[str]
+    drives: list[str]
+    recordings: list[Summary]
+    questions: list[str]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,11 +104,8 @@ def run(options: argparse.Namespace) -> int:
         screen.print('[bold]Next[/] See what the recording contains:')
         screen.print(shell_command(f'pprs info {names} --model {file}'))
     if options.json:
-        write_json(options.json, {
-            'model': options.output, 'notes': first.notes,
-            'drives': list(model.drives),
-            'recordings': [asdict(summary) for summary in summaries],
-            'questions': first.questions})
+        write_json(options.json, InitJson(notes=first.notes, drives=list(model.drives),
+                                          recordings=summaries, questions=first.questions))
     if first.questions:
         screen.print(NOT_SURE)
     return 1 if first.questions else 0

@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     check_purpose(options.purpose, options.recordings)
     screen, result = answer(next_experiment, options, purpose=options.purpose, seed=options.seed)
-    show(result, options, screen, output=options.output)
+    show(result, options, screen)
     result.save(options.output)
     if result.inputs.model.moves_joints:
         screen.print('[bold]Play it[/] with a controller of joint trajectories: positions, '

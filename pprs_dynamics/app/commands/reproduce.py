@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import asdict
 from pathlib import Path
+from typing import TypedDict
 
 from pprs_dynamics.app.commands.arguments import output_folder, write_json
 from pprs_dynamics.app.report.pictures import draw_figure_8, draw_figure_9
@@ -19,10 +19,17 @@ from pprs_dynamics.app.report.terminal import console, escape, shown, text_table
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.reproduction import Reproduction, reproduce
+from pprs_dynamics.physics.model.reproduction import Claim, Reproduction, reproduce
 from pprs_dynamics.system.csv_tables import write_table
 
 EXAMPLE = 'pprs reproduce --output output'
+
+
+class ReproductionJson(TypedDict):
+    """The paper's claims, with the equations of the model file: `corrected` or `printed`."""
+
+    equations: str
+    claims: tuple[Claim, ...]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,8 +54,7 @@ def run(options: argparse.Namespace) -> int:
         written = [draw_figure_8(folder / 'figure_8.png', result),
                    draw_figure_9(folder / 'figure_9.png', result),
                    _write_curves(folder / 'forces.csv', result)]
-    content = {'equations': model.values['equations'],
-               'claims': [asdict(claim) for claim in result.claims]}
+    content = ReproductionJson(equations=model.values['equations'], claims=result.claims)
     for file in filter(None, (folder / 'claims.json', options.json)):
         write_json(file, content)
     screen.print(text_table(

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
             model, options.effect, seed=options.seed, motion=motion, duration=options.duration,
             path_seed=options.path_seed, progress=progress)
     result.save(options.output)
-    show(result, options, screen, recording=options.output)
+    show(result, options, screen)
     screen.print(f'recording: {shown(options.output)}', soft_wrap=True)
     return 0
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from pprs_dynamics.app.commands.arguments import UsageError, output_folder, whole, write_json
 from pprs_dynamics.app.fleet.recordings import (
@@ -35,6 +35,23 @@ MOST_SHOWN = 10  # errors
 STOPPED = 'the scheduler has stopped; what was written remains, and the same command does the rest'
 MOST_WORKERS = 1024
 EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
+
+
+class SurveyJson(TypedDict):
+    """Counts of the recordings of a survey.
+
+    Parameters
+    ----------
+    recordings, done, done_before : int
+        All, those with a result, and those that the store contained already.
+    errors : dict of str to str
+        Recordings without a result, with the reason.
+    """
+
+    recordings: int
+    done: int
+    done_before: int
+    errors: dict[str, str]
 
 
 class SchedulerError(PprsError, ConnectionError):
@@ -174,7 +191,6 @@ def run(options: argparse.Namespace) -> int:
     screen.print(f'{counted(len(jobs), "recording")}: {done} done, {earlier} done before, '
                  f'{len(failed)} without a result; store: {shown(options.output)}')
     if options.json:
-        write_json(options.json, {
-            'recordings': len(jobs), 'done': done, 'done_before': earlier,
-            'errors': [{'recording': path, 'error': error} for path, error in failed.items()]})
+        write_json(options.json, SurveyJson(recordings=len(jobs), done=done, done_before=earlier,
+                                            errors=failed))
     return 0

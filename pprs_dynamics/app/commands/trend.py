@@ -28,10 +28,10 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     fleet = fleet_trends(options.store)
-    for text in fleet.sentences():
+    for text in fleet.text:
         screen.print(shown(text))
     if options.json:
-        write_json(options.json, fleet.to_dict())
+        write_json(options.json, fleet)
     if options.report:
         screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}', soft_wrap=True)
     return 0
@@ -39,10 +39,10 @@ def run(options: argparse.Namespace) -> int:
 
 def fleet_page(fleet: FleetTrends) -> Page:
     """Return the page."""
-    changed = fleet.changed
+    changed = fleet.changes
     count = len({trend.robot for trend in changed})
     page = Page(f'Fleet: {count} of {len(fleet.robots)} robots changed')
-    first, *others = fleet.sentences()
+    first, *others = fleet.text
     page.text(first, 'lead')
     page.bullets(others)
     if changed:
@@ -57,7 +57,7 @@ def fleet_page(fleet: FleetTrends) -> Page:
                 charts.MODEL, mode='markers', hovertemplate=f'%{{y:.4g}} {trend.unit}'),
                 row=row, col=1)
             for step in trend.steps:
-                figure.add_vline(x=f'{step.time:%Y-%m-%dT%H:%M:%S}', row=row, col=1,
+                figure.add_vline(x=step.time[:19], row=row, col=1,
                                  line={'color': charts.ERROR, 'dash': 'dash'})
         page.figure(figure, 'Quantities that changed, the clearest first. Dashed: the first '
                     'recording after a step.')

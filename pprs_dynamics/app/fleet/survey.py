@@ -116,7 +116,7 @@ def _row(effect: type[CatalogueEffect], key: str, found: Estimate, **more: float
     """Return the row of a parameter, by its key with its drive."""
     drive, parameter = effect.place_and_parameter(key)
     return {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
-            **found.to_dict(), **more}
+            **vars(found), **more}
 
 
 def _numbers(calibrated: Sequence[Calibration]) -> list[dict[str, Any]]:

@@ -10,7 +10,6 @@ step in about one of a hundred stores. A slow change is reported as one or more 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +20,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, with_uncertainty
 from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.system.json_records import JsonRecord
 from pprs_dynamics.system.plain_text import counted, displayed
 
 FALSE_ALARMS = 0.01  # stores in which nothing changes and a step is reported
@@ -32,18 +32,37 @@ SAME = ['model', 'options', 'version']  # rows that differ in these are differen
 
 
 @dataclass(frozen=True)
-class Step:
-    """A step of a quantity: mean values before and after, with the deviation of the difference."""
+class TrendStep:
+    """A step of a quantity.
 
-    time: Any
+    Parameters
+    ----------
+    time : str
+        Time of the first recording after it, ISO 8601.
+    before, after, std : float
+        Mean values, and the standard deviation of their difference.
+    """
+
+    time: str
     before: float
     after: float
     std: float
 
 
 @dataclass(frozen=True, eq=False)
-class Trend:
-    """A quantity of a robot over time, (N,) times and values, and its steps in order."""
+class Trend(JsonRecord):
+    """A quantity of a robot over time.
+
+    Parameters
+    ----------
+    robot, drive, effect, parameter, unit : str
+        '' for a drive or an effect that it does not have.
+    time, value : (N,) arrays
+    steps : tuple of TrendStep
+        In order.
+    """
+
+    json_keys = ('robot', 'drive', 'effect', 'parameter', 'unit', 'steps')
 
     robot: str
     drive: str
@@ -52,7 +71,7 @@ class Trend:
     unit: str
     time: Any
     value: Array
-    steps: tuple[Step, ...]
+    steps: tuple[TrendStep, ...]
 
     @property
     def name(self) -> str:
@@ -63,48 +82,49 @@ class Trend:
     @property
     def text(self) -> str:
         """The steps in a sentence."""
-        steps = '; '.join(f'{step.time:%Y-%m-%d}: {in_unit(step.before, self.unit)} → '
+        steps = '; '.join(f'{step.time[:10]}: {in_unit(step.before, self.unit)} → '
                           f'{with_uncertainty(step.after, step.std, self.unit)}'
                           for step in self.steps)
         return f'{displayed(self.robot)}, {self.name}: {steps}'
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of `changes` in the JSON."""
-        return {'robot': self.robot, 'drive': self.drive or None, 'effect': self.effect or None,
-                'parameter': self.parameter, 'unit': self.unit,
-                'steps': [{**vars(step), 'time': step.time.isoformat()} for step in self.steps]}
 
 
 @dataclass(frozen=True)
-class FleetTrends:
-    """All trends of a store, and its recordings without a result by path, with the reason."""
+class FleetTrends(JsonRecord):
+    """All trends of a store.
+
+    Parameters
+    ----------
+    trends : tuple of Trend
+    refused : dict of str to str
+        Recordings without a result, with the reason.
+    """
+
+    json_keys = ('robots', 'changes', 'refused', 'text')
 
     trends: tuple[Trend, ...]
     refused: dict[str, str]
 
     @property
-    def changed(self) -> list[Trend]:
+    def changes(self) -> list[Trend]:
         """Trends with steps, the clearest first."""
         return sorted((trend for trend in self.trends if trend.steps), key=lambda trend: -max(
             abs(step.after - step.before) / max(step.std, 1e-300) for step in trend.steps))
 
     @property
     def robots(self) -> list[str]:
-        """Names."""
+        """Names of the robots."""
         return sorted({trend.robot for trend in self.trends})
 
-    def sentences(self) -> Iterator[str]:
-        """Yield what changed, one sentence for each quantity."""
-        yield from (trend.text for trend in self.changed)
-        if not self.changed:
-            yield f'No change on {counted(len(self.robots), "robot")}.'
+    @property
+    def text(self) -> list[str]:
+        """What changed, one sentence for each quantity."""
+        sentences = ([trend.text for trend in self.changes]
+                     or [f'No change on {counted(len(self.robots), "robot")}.'])
         if self.refused:
-            yield f'{counted(len(self.refused), "recording")} gave no result.'
+            sentences.append(f'{counted(len(self.refused), "recording")} gave no result.')
+        return sentences
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `pprs trend --json` writes."""
-        return {'robots': self.robots, 'changes': [trend.to_dict() for trend in self.changed],
-                'refused': self.refused, 'text': list(self.sentences())}
 
 
 def fleet_trends(store: str) -> FleetTrends:
@@ -145,7 +165,7 @@ def _is_strength(effect: str, parameter: str) -> bool:
     return found is not None and parameter in {linear.name for linear in found.linear}
 
 
-def find_steps(time: Any, value: Array, series: int = 1) -> tuple[Step, ...]:
+def find_steps(time: Any, value: Array, series: int = 1) -> tuple[TrendStep, ...]:
     """Return the steps of a series.
 
     Parameters
@@ -171,6 +191,6 @@ def find_steps(time: Any, value: Array, series: int = 1) -> tuple[Step, ...]:
     places = search.fit(value[:, None] / scatter).predict(pen=penalty)
     parts = np.split(value, places[:-1])
     return tuple(
-        Step(time.iloc[place], float(before.mean()), float(after.mean()),
+        TrendStep(time.iloc[place].isoformat(), float(before.mean()), float(after.mean()),
              scatter * (1 / len(before) + 1 / len(after)) ** 0.5)
         for place, before, after in zip(places, parts, parts[1:], strict=False))

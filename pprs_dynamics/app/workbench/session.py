@@ -137,8 +137,8 @@ class Session:
                 'is_approximate': view.is_approximate,
                 'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(fits.drives),
-                'errors': {name: error.to_dict() for name, error in self.errors().items()},
-                'overall': self.overall().to_dict(), **view_state.units_to_dict(model),
+                'errors': for_json(self.errors()),
+                'overall': for_json(self.overall()), **view_state.units_to_dict(model),
                 'effects': [view_state.effect_to_dict(view, effect, fits, reported)
                             for effect in fits.candidates()],
                 'verdict': diagnosis.verdict if diagnosis else None,
@@ -149,8 +149,8 @@ class Session:
                 'steps': [step.to_dict() for step in read_steps(model.values)],
                 'undoes': ticks.undoes, 'redoes': ticks.redoes,
                 'jobs': {kind: job.to_dict() for kind, job in jobs.of_kind.items()},
-                'adoption': for_json(jobs.adoption.to_dict()) if jobs.adoption else None,
-                'experiment': for_json(jobs.experiment.to_dict()) if jobs.experiment else None,
+                'adoption': jobs.adoption.to_dict() if jobs.adoption else None,
+                'experiment': jobs.experiment.to_dict() if jobs.experiment else None,
                 'recordings': view_state.recordings_to_dict(
                     ticks.inputs.recordings, fits, view.residual),
                 'held_out': [{'key': key, 'name': recording.name}

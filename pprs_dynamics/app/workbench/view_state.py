@@ -25,7 +25,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.json_records import JsonRecord
 from pprs_dynamics.system.numbers import finite
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
@@ -36,7 +35,7 @@ CHANGED_SHAPES = 1.0  # fall of the cost, from which what the others would gain 
 
 
 @dataclass(frozen=True)
-class DriveError(JsonRecord):
+class DriveError:
     """Root of the mean squared error of a drive, or of all [N]; NaN where it is not known."""
 
     before: float

@@ -188,14 +188,10 @@ class _Case:
             return (said,)
         if gain.confirms:
             return ()
-        sure = gain.certainty
-        link, weighted = ('but', '') if after < before else (
-            'and', 'but weighted by the noise it falls ')
-        why = (f'{link} on {listed(gain.losing)} it certainly rises' if gain.losing else
-               f'{link} weighted by the noise it rises by {-sure:.2g} standard errors'
-               if sure < 0 else
-               f'{weighted}by {sure:.2g} standard errors, and more than {SURE:g} are required')
-        return (f'{said}, {why}',)
+        if gain.losing:
+            return (f'{said}. On {listed(gain.losing)} it certainly rises',)
+        return (f'the error on {where}, weighted by the noise, falls by {gain.certainty:.2g} '
+                f'standard errors, and at least {SURE:g} must be reached',)
 
     def adoption(self, request: EffectRequest, after: DriveModel,
                  residuals: Sequence[Residuals], held_out: Sequence[float],
@@ -229,7 +225,8 @@ class _Case:
         first, last = held_out or errors
         fall = change(first, last, before.unit)
         if gain is not None and not last < first:
-            fall = (f'falls by {in_standard_errors(gain)}, weighted by the noise; the unweighted '
+            sure = max(gain.certainty, *gain.by_drive.values())
+            fall = (f'falls by {sure:.2g} standard errors, weighted by the noise; the unweighted '
                     f'error {fall}')
         return Adoption(**{
             'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
@@ -238,14 +235,6 @@ class _Case:
             'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
             'reason': f'the error on {self.held_out} {fall}',
             'reference': () if self.reference is None else self.reference.names, **details})
-
-
-def in_standard_errors(gain: PredictiveGain) -> str:
-    """Return the gain of all drives together, or of one drive where that is surer, in words."""
-    drive = max(gain.by_drive, key=lambda name: gain.by_drive[name])
-    if gain.certainty >= gain.by_drive[drive]:
-        return f'{gain.certainty:.2g} standard errors'
-    return f'{gain.by_drive[drive]:.2g} standard errors on {drive}'
 
 
 # An effect of the catalogue
@@ -480,9 +469,11 @@ class AdoptionRun(JsonRecord):
     Parameters
     ----------
     steps : tuple of Adoption
-        Those that were refused at the end are the last ones.
+        Answers, effect by effect; refused ones come last.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
+        Why the run ended.
     reason : str
+        The same in one sentence.
     model : DriveModel
         With all that was adopted.
     """

@@ -35,7 +35,7 @@ class Adoption(JsonRecord):
     ----------
     request : EffectRequest
     drives : tuple of str or None
-        On which it was fitted.
+        Drives on which it was fitted; None: not on drives.
     before, after : DriveModel
         As given; and with the effect. The latter is the former where the effect gives no model.
     residuals_before, residuals_after : Residuals
@@ -43,28 +43,33 @@ class Adoption(JsonRecord):
     held_out_before, held_out_after : float
         Errors on held-out data [N].
     held_out_on : {'blocks', 'validation'}
+        Held-out data: blocks of the recordings, or those of --validate.
     noise_floors : mapping of str to float
         Root of the mean square of the noise of each drive, as the diagnosis has it [N].
     parameters : mapping of str to Estimate
+        Values by drive.parameter, or parameter.
     objections, remarks : tuple of str
+        Sentences: why the effect should not be adopted, and what else its user should know.
     calibrated : tuple of Calibration
         Numbers of the model that moved within their tolerances.
     rivals : tuple of str
         Effects that explain the recordings as well.
     moments : mapping of str to Estimate
-        First moments of added bodies: see `Estimates`.
+        First moments of added bodies, mass times centre.
     curve : FittedCurve, optional
         Of a measured curve, with its band.
     reference : tuple of str
-        Runs since which the effect is a change; errors are beyond what they show as well.
+        Reference runs since which the effect is a change.
     adopted : bool
+        Whether the effect was added to the model.
     reason : str
         Why, in one sentence.
     """
 
     json_keys = ('adopted', 'reason', 'effect', 'error_before', 'error_after', 'held_out_before',
                  'held_out_after', 'held_out_on', 'noise_floor', 'forced', 'drives', 'objections',
-                 'remarks', 'rivals', 'parameters', 'calibrated', 'moments?', 'reference?')
+                 'remarks', 'rivals', 'parameters', 'calibrated', 'moments', 'reference')
+    json_optional = ('moments', 'reference')
 
     request: EffectRequest
     drives: tuple[str, ...] | None

@@ -16,6 +16,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
+    EffectAlone,
     FoundEffect,
     RankedSet,
     RivalEffect,
@@ -290,26 +291,24 @@ class Answer:
                     rivals[name] += [other for other in rival.instead if other not in rivals[name]]
         return tuple((name, *others) for name, others in rivals.items() if others)
 
-    def _candidates(self) -> tuple[RankedSet, ...]:
+    def _candidates(self) -> tuple[EffectAlone, ...]:
         """Return the effects that were fitted alone, the best first."""
         first = self.table.first
         none = first.evaluate(()).terms
-        return tuple(self._ranked(fitted, fitted.terms, none, linear_error(first, fitted))
-                     for fitted in self.table.alone.values())
+        return tuple(EffectAlone(candidate.name, self.design.named(candidate.drives),
+                                 (none - fitted.terms).total, linear_error(first, fitted))
+                     for fitted in self.table.alone.values() for candidate in fitted.candidates)
 
-    def _suspects(self) -> tuple[RankedSet, ...]:
+    def _suspects(self) -> tuple[EffectAlone, ...]:
         """Return effects nearly worth their prior cost in addition to the reported ones."""
-        return tuple(replace(
-            self._ranked(row.fitted, row.terms),
-            names=((candidate.name, self.design.named(candidate.drives)),))
-            for candidate, row in self.table.suspects(self.decisions.suspect_margin))
+        return tuple(EffectAlone(candidate.name, self.design.named(candidate.drives),
+                                 (self.table.best.terms - row.terms).total, np.nan)
+                     for candidate, row in self.table.suspects(self.decisions.suspect_margin))
 
-    def _ranked(self, fitted: CandidateSet, terms: CostTerms, other: CostTerms | None = None,
-                error_after: float = np.nan) -> RankedSet:
-        """Return a set with its cost above other terms, by default those of the best row."""
+    def _ranked(self, fitted: CandidateSet, terms: CostTerms) -> RankedSet:
+        """Return a set with its cost above that of the best row."""
         names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
-        return RankedSet(names, terms - (other or self.table.best.terms), fitted.barred,
-                         error_after)
+        return RankedSet(names, terms - self.table.best.terms, fitted.barred)
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return inadmissible sets that would be rivals or better, the cheapest of each names."""

@@ -167,11 +167,11 @@ class DriveComparison(JsonRecord):
     ----------
     drive : str
     rms, bias, peak : float
-        Of measured minus model [N]; peak is the largest absolute value.
+        Root mean square, mean and largest absolute value of measured minus model [N, N m].
     effort : float
         rms of the measured effort with its mean removed [N].
     relative : float
-        rms over `effort`; NaN where that effort is constant.
+        `rms` over the rms of the effort with its mean removed; NaN for a constant effort.
     explained_variance : float
         1 - var(residual) / var(effort); NaN where the effort is constant.
     samples : int
@@ -228,7 +228,7 @@ class Comparison(JsonRecord):
     Parameters
     ----------
     drives : mapping of str to DriveComparison
-        Only drives with measurements.
+        Errors of each drive that was measured.
     rms, relative : float
         Pooled over drives [N]; and over the pooled effort.
     localisation : Localisation

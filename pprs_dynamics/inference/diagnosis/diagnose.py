@@ -75,10 +75,17 @@ def diagnose(
     since = None if reference is None else SinceReference.of(reference, table.first.design)
     found = replace(answer_of(table, validate), since=since)
     report(1.0)
-    # Effects that explain numbers in another unit, sign or order are none of the machine.
-    doubts = dict.fromkeys(finding.what for recording in (*recordings, *validate)
-                           for finding in recording.findings if isinstance(finding, OtherReading))
-    return replace(found, verdict='unknown', other_reading='; '.join(doubts)) if doubts else found
+    doubts = _other_reading((*recordings, *validate))
+    return replace(found, verdict='unknown', other_reading=doubts) if doubts else found
+
+
+@outside_cost('a recording looks like other units, signs or order of drives than it was read with: '
+              '`unknown`')
+def _other_reading(recordings: Sequence[Recording]) -> str:
+    """Return what recordings look like; '' if they look like what they were read as."""
+    return '; '.join(dict.fromkeys(
+        finding.what for recording in recordings for finding in recording.findings
+        if isinstance(finding, OtherReading)))
 
 
 @outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '
@@ -95,7 +102,7 @@ def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisio
                  if drive not in before or before[drive].kind != looks.kind}
     # No law of a drive's motion describes what its controller and its elasticity do.
     return other, {} if other else {drive: slip for drive, slip in sticking_drives(
-        recordings).items() if slip.share > decisions.stick_slip}
+        recordings).items() if slip.share_of_time > decisions.stick_slip}
 
 
 def other_mounting(model: DriveModel, recordings: Sequence[Recording],

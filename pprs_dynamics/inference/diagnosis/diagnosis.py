@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import nan
 
 import numpy as np
 
@@ -37,7 +36,7 @@ from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.json_records import JsonRecord
 
@@ -53,49 +52,31 @@ class RankedSet(JsonRecord):
     names : tuple of (name, drives)
         Effects, and `unknown, VARIABLE` for patterns of no catalogue.
     terms : CostTerms
-        Of its cost, less those of the set that it is compared with.
+        Terms of the cost, less those of the set that it is compared with.
     barred : str
-        Why it may not be, whatever it costs; '' where it may.
-    error_after : float
-        Error with it, by linear forces [N]; NaN where that is not asked.
+        Why it is excluded, whatever it costs; '' where it is not.
     """
 
-    json_keys = ('cost', 'terms', 'effects', 'barred?')
+    json_keys = ('cost', 'terms', 'effects', 'barred')
+    json_optional = ('barred',)
 
     names: tuple[tuple[str, Drives], ...]
     terms: CostTerms
     barred: str = ''
-    error_after: float = nan
 
     @property
     def cost(self) -> float:
-        """Above that of the other set; lower is better."""
+        """Cost above that of the set that it is compared with; lower is better."""
         return self.terms.total
-
-    @property
-    def evidence(self) -> float:
-        """By how much it costs less than the other set."""
-        return -self.cost
-
-    @property
-    def name(self) -> str:
-        """Names of its effects."""
-        return ' and '.join(name for name, _ in self.names)
 
     @property
     def effects(self) -> tuple[NamedEffect, ...]:
         """Effects, and `unknown, VARIABLE` for patterns of no catalogue."""
         return tuple(NamedEffect(*named) for named in self.names)
 
-    @property
-    def alone(self) -> EffectAlone:
-        """The effect of a set of one effect."""
-        (name, drives), = self.names
-        return EffectAlone(name, drives, self.evidence, self.error_after)
-
 
 @dataclass(frozen=True)
-class NamedEffect(JsonRecord):
+class NamedEffect:
     """An effect of a set, and the drives that it is on; null: not on drives."""
 
     name: str
@@ -104,12 +85,12 @@ class NamedEffect(JsonRecord):
 
 @dataclass(frozen=True)
 class EffectAlone(NamedEffect):
-    """An effect alone, or as one more.
+    """An effect alone, or in addition to the reported set.
 
     Parameters
     ----------
     evidence : float
-        By how much the cost falls with it; 0 is the threshold.
+        Fall of the cost with it; 0 is the threshold.
     error_after : float
         Error with it [N]; null in `suspects`.
     """
@@ -126,16 +107,17 @@ class FoundEffect(JsonRecord):
     ----------
     effect : type of CatalogueEffect
     drives : tuple of str or None
-        On which it sits; None for the structure.
+        Drives that it is on; None: not on drives.
     parameters : dict of str to Estimate
+        Values by drive.parameter, or parameter.
     force : (M, D) array
         What it contributes [N].
     evidence : float
         Cost of the best set without it, less that of the best set.
     error_before, error_after : float
-        Without its force, all else as it was fitted, and with it [N].
+        RMS error over all drives without its force, all else as fitted, and with it [N].
     held_out_before, held_out_after : float
-        On held-out data: fitted without it, and with it [N].
+        RMS error over all drives on held-out data, fitted without it and with it [N].
     at_bound : tuple of str
         Parameters whose value is none: at the edge of what was tried.
     gain : PredictiveGain, optional
@@ -146,17 +128,19 @@ class FoundEffect(JsonRecord):
     without : RankedSet, optional
         The best set without it, against the best one with it.
     in_model : mapping of str to float
-        What the given model says of the parameters, where it has the effect: then the recordings
-        say something else. Empty for an effect that it lacks.
+        Values of the input model, if it has the effect and the recordings contradict its values;
+        empty for an effect that it lacks.
     course : Course or None
         When it is there, from the start of the first recording [s]; None: all the time.
     moments : mapping of str to Estimate
-        First moments of added bodies: see `Estimates`.
+        First moments of added bodies, mass times centre.
     """
 
-    json_keys = ('name', 'drives', 'alike', 'since', 'course=kind_of_course', 'parameters',
-                 'moments?', 'in_model?', 'without', 'held_out_certainty=certainty', 'evidence',
-                 'error_before', 'error_after', 'held_out_before', 'held_out_after')
+    json_keys = ('name', 'drives', 'alike', 'since', 'course', 'parameters', 'moments', 'in_model',
+                 'without', 'held_out_certainty', 'evidence', 'error_before', 'error_after',
+                 'held_out_before', 'held_out_after')
+    json_attributes = (('course', 'kind_of_course'),)
+    json_optional = ('moments', 'in_model')
 
     effect: type[CatalogueEffect]
     drives: Drives
@@ -186,7 +170,7 @@ class FoundEffect(JsonRecord):
         return self.effect.places_of(self.parameters)
 
     @property
-    def certainty(self) -> float:
+    def held_out_certainty(self) -> float:
         """Standard errors of the held-out gain; NaN where that is unknown."""
         return float('nan') if self.gain is None else self.gain.certainty
 
@@ -246,11 +230,11 @@ class SinceReference(JsonRecord):
     recordings : tuple of str
         The reference runs.
     covered : float
-        Share of the samples whose states they know.
+        Share of the samples in states that the reference runs contain.
     explained : mapping of str to float
-        Share of each drive's squared error, under the model as given, that they show as well.
+        Share of each drive's squared error under the input model that they show as well.
     pace : float
-        Speed of the drives, over that in them: the median of all drives.
+        Speed of the drives over that in the reference runs, median over drives.
     note : str
         What must be known of them; '' for nothing.
     """
@@ -281,29 +265,32 @@ class SinceReference(JsonRecord):
 
 @dataclass(frozen=True)
 class Diagnosis(JsonRecord):
-    """The answer.
+    """Answer of a diagnosis.
 
     Parameters
     ----------
     verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
     effects : tuple of FoundEffect
-        Those of the row of least cost; whose force removes most of the error first.
+        The reported effects, largest error reduction first.
     indistinguishable : tuple of tuple of str
-        Each an adopted effect and its rivals.
+        Each a reported effect and its rivals; NAME:PLACE for another link or joint.
     unconfirmed : tuple of FoundEffect
-        Fitted as well, but no machine can have them, or the error does not fall with them, or not
-        on held-out data.
-    candidates, suspects : tuple of RankedSet
-        Each effect alone against none, and each as one more against the reported set.
+        Effects of the set of least cost that the data refute: the error does not fall with them,
+        or held-out data are predicted worse.
+    candidates : tuple of EffectAlone
+        Each effect alone, against none.
+    suspects : tuple of EffectAlone
+        Effects that are nearly worth their prior penalty in addition to the reported set.
     depends_on : tuple of Statement
-        What no effect explains.
+        Patterns of the error that no effect explains.
     sets : tuple of RankedSet
-        The best sets of the search, the best first.
+        The best sets of the search; the first is reported.
     barred : tuple of RankedSet
-        Those that would cost less than a rival and may not be.
+        Excluded sets that cost less than the best one or at most 10 more, with the reason.
     calibrated : tuple of Calibration
-        Numbers that moved within their tolerances.
+        Numbers of the model that moved within their tolerances.
     warnings, notes : tuple of str
+        Sentences that qualify the answer.
     model : DriveModel
         As given.
     adopted : DriveModel
@@ -324,14 +311,15 @@ class Diagnosis(JsonRecord):
         Drives whose noise the recordings do not determine: their floor is an upper bound, the
         residual of the best set.
     held_out_on : {'blocks', 'validation'}
+        Held-out data: blocks of the recordings, or those of --validate.
     effort_looks_like : mapping of str to NoMeasurement
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
-        Drives that stick and slip for much of the time: then nothing else is claimed.
+        Drives that stick and slip for much of the time: then no effect is reported.
     other_reading : str
         Units, signs or order that recordings look to have, but were not read with; '' for none.
     since : SinceReference, optional
-        The reference run since which changes are reported; None: what the model lacks.
+        The reference runs since which changes are reported; None without --reference.
     selection : ModelTable, optional
         All rows that were fitted.
     """
@@ -339,16 +327,17 @@ class Diagnosis(JsonRecord):
     json_keys = (
         'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'barred', 'depends_on',
         'calibrated', 'detectable', 'held_out_on', 'above_noise', 'noise_floor', 'noise_floors',
-        'warnings', 'refit=refit_errors', 'candidates=each_alone', 'suspects=each_suspect',
-        'stick_slip', 'effort_looks_like=kinds_of_effort', 'explained', 'explained_after',
-        'little_explained=little', 'reference=since', 'changed_since')
+        'warnings', 'refit', 'candidates', 'suspects', 'stick_slip', 'effort_looks_like',
+        'explained', 'explained_after', 'little_explained', 'reference', 'changed_since')
+    json_attributes = (('refit', 'refit_errors'), ('effort_looks_like', 'kinds_of_effort'),
+                       ('little_explained', 'little'), ('reference', 'since'))
 
     verdict: str
     effects: tuple[FoundEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     unconfirmed: tuple[FoundEffect, ...]
-    candidates: tuple[RankedSet, ...]
-    suspects: tuple[RankedSet, ...]
+    candidates: tuple[EffectAlone, ...]
+    suspects: tuple[EffectAlone, ...]
     depends_on: tuple[Statement, ...]
     sets: tuple[RankedSet, ...]
     barred: tuple[RankedSet, ...]
@@ -373,7 +362,7 @@ class Diagnosis(JsonRecord):
 
     @cached_property
     def detectable(self) -> tuple[DetectableSize, ...]:
-        """Smallest sizes of other effects; none where the answer is open."""
+        """Sizes from which other effects would have been reported; none for an open answer."""
         if (self.selection is None or self.verdict not in ('adequate', 'effect')
                 or any(effect.course for effect in self.effects)):
             return ()
@@ -393,16 +382,6 @@ class Diagnosis(JsonRecord):
     def refit_errors(self) -> dict[str, float]:
         """`error_before` and `error_after` a refit of the model's numbers, without the effects."""
         return {'error_before': root_mean_square(self.residuals.error), 'error_after': self.refit}
-
-    @property
-    def each_alone(self) -> tuple[EffectAlone, ...]:
-        """Each effect alone against none."""
-        return tuple(ranked.alone for ranked in self.candidates)
-
-    @property
-    def each_suspect(self) -> tuple[EffectAlone, ...]:
-        """Effects that nearly pay their prior cost in addition to the reported ones."""
-        return tuple(ranked.alone for ranked in self.suspects)
 
     @property
     def kinds_of_effort(self) -> dict[str, str] | None:
@@ -426,37 +405,27 @@ class Diagnosis(JsonRecord):
 
 
 @dataclass(frozen=True)
-class DetectableSize(JsonRecord):
+class DetectableSize:
     """The smallest size at which an effect would have been reported, by drive or structure.
 
     Parameters
     ----------
-    effect : type of CatalogueEffect
+    name : str
+        Name of the effect.
     drive : str or None
-    parameter : Parameter
-        The one number that it has.
+        None: not on a drive.
+    parameter : str
+        Name of the one number that it has.
     size : float
-        Of that.
+        Smallest size that would have been reported.
     unit : str
     """
 
-    json_keys = ('name', 'drive', 'parameter=parameter_name', 'size', 'unit')
-
-    effect: type[CatalogueEffect]
+    name: str
     drive: str | None
-    parameter: Parameter
+    parameter: str
     size: float
     unit: str
-
-    @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.effect.name
-
-    @property
-    def parameter_name(self) -> str:
-        """Name of the parameter."""
-        return self.parameter.name
 
 
 def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[DetectableSize, ...]:
@@ -497,7 +466,7 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
             continue  # no machine has so much of it; a body somewhere else has a place as well
         (parameter,) = numbers
         drive = None if component.drive is None else fits.design.drives[component.drive]
-        found.append(DetectableSize(component.effect, drive, parameter,
+        found.append(DetectableSize(component.effect.name, drive, parameter.name,
                                     abs(values[parameter.name]), units.of(parameter.unit)))
     return tuple(found)
 

@@ -44,12 +44,13 @@ class LiveEffect(JsonRecord):
     names : frozenset of str
         Its name and those of its rivals.
     since : float or None
-        When it began [s], on the stream's clock; None where it was there from the start.
+        When it began [s], on the stream's clock; None: from the start.
     confirmed : bool
         Whether it was confirmed on a window that it was not fitted to.
     """
 
-    json_keys = ('**found', 'since', 'confirmed')
+    json_of = 'found'
+    json_keys = ('since', 'confirmed')
 
     found: FoundEffect
     names: frozenset[str]
@@ -104,19 +105,19 @@ class LiveDiagnosis(JsonRecord):
     model : DriveModel
         As given: every window is diagnosed against it.
     effects : tuple of LiveEffect
-        Named by the latest windows; only the confirmed ones are claimed.
+        Effects of the latest windows; only confirmed ones are claimed.
     last : Window, optional
         The latest window that was diagnosed.
     withdrawn : tuple of LiveEffect
-        Claimed before, and gone with the latest window.
+        Claimed before, but not supported by the latest window.
     note : str
         Why the latest window was not diagnosed; empty where it was.
     reference : Reference, optional
         Since which every window is diagnosed.
     """
 
-    json_keys = ('**latest', 'effects', 'withdrawn', 'confirmed=is_confirmed', 'note', 'since',
-                 'text', 'window')
+    json_of = 'latest'
+    json_keys = ('effects', 'withdrawn', 'confirmed', 'note', 'since', 'text', 'window')
 
     model: DriveModel
     effects: tuple[LiveEffect, ...] = ()
@@ -147,7 +148,7 @@ class LiveDiagnosis(JsonRecord):
         return {} if self.last is None else self.last.diagnosis
 
     @property
-    def is_confirmed(self) -> bool:
+    def confirmed(self) -> bool:
         """Whether any of the effects is claimed."""
         return bool(self.claimed)
 

@@ -104,16 +104,11 @@ def change(before: float, after: float, unit: str = 'N') -> str:
     if not after < before:  # nor where one is not a number
         return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
                 'after)')
-    first, second = both_in_unit(before, after, unit)
+    digits = digits_apart(before, after)
+    first, second = in_unit(before, unit, digits), in_unit(after, unit, digits)
     if first == second:  # six digits do not show it
         return f'falls from {in_unit(before, unit)} by less than 0.001%'
     return f'falls from {first} to {second}'
-
-
-def both_in_unit(before: float, after: float, unit: str = 'N') -> tuple[str, str]:
-    """Return two efforts with their unit, and with as many digits as show their difference."""
-    digits = digits_apart(before, after)
-    return in_unit(before, unit, digits), in_unit(after, unit, digits)
 
 
 def fall(before: float, after: float) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isnan
 
-from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
     Drives,
@@ -23,7 +23,6 @@ from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
 from pprs_dynamics.inference.diagnosis.quantities import (
     INTERVAL,
     as_fitted,
-    both_in_unit,
     change,
     in_fitting_unit,
     in_unit,
@@ -42,6 +41,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
 )
 from pprs_dynamics.inference.search.candidates import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
@@ -161,9 +161,9 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
-        tuple(f'{_set(diagnosis, suspect)}: possible, but slow noise '
-              f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
-              'Repeat the recording' for suspect in diagnosis.suspects),
+        tuple(with_drives(suspect.name, suspect.drives, diagnosis.residuals.drives)
+              + f': possible, but it costs {-suspect.evidence:.1f} more than it explains. A longer '
+              'recording decides' for suspect in diagnosis.suspects),
         tuple(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. This set '
               f'{_cost(ranked)}'
               for ranked in diagnosis.barred),
@@ -200,13 +200,13 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """Return each effect that is not reported, with the size from which it would have been."""
-    rows: dict[tuple[type[CatalogueEffect], Parameter, str], list[float]] = {}
+    rows: dict[tuple[str, str, str], list[float]] = {}
     for detectable in diagnosis.detectable:
-        key = (detectable.effect, detectable.parameter, detectable.unit)
+        key = (detectable.name, detectable.parameter, detectable.unit)
         rows.setdefault(key, []).append(detectable.size)
-    return [(effect.name, (f'{parameter.name} ' if len(effect.linear) > 1 else '')
+    return [(name, (f'{parameter} ' if len(catalogue()[name].linear) > 1 else '')
              + in_fitting_unit((min(sizes), max(sizes)), unit))
-            for (effect, parameter, unit), sizes in rows.items()]
+            for (name, parameter, unit), sizes in rows.items()]
 
 
 def word_detectable(diagnosis: Diagnosis) -> str:
@@ -259,7 +259,7 @@ def _against_best(diagnosis: Diagnosis, ranked: RankedSet) -> str:
 
 def word_terms(terms: CostTerms) -> str:
     """Return the visible terms of a difference of costs."""
-    return ', '.join(f'{name} {_rise(value)}' for name, value in terms.to_dict().items()
+    return ', '.join(f'{name} {_rise(value)}' for name, value in vars(terms).items()
                      if abs(value) >= LEAST_TERM)
 
 
@@ -395,18 +395,17 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 
 
 def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
-    card, unit = effect.effect.card, diagnosis.residuals.unit
+    card = effect.effect.card
     title, is_validated = _title(diagnosis, effect), diagnosis.held_out_on == 'validation'
     what = (_otherwise(diagnosis, effect) if effect.in_model else
             f'The model lacks {title}: {_parameters(diagnosis, effect)}')
     if issubclass(effect.effect, MeasurementEffect):
         what += '. It describes the sensor, and is never used in a command'
-    data = 'the --validate recordings' if is_validated else 'held-out blocks of the same recording'
-    why = f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
-    if not isnan(effect.held_out_after):
-        before, after = both_in_unit(effect.held_out_before, effect.held_out_after, unit)
-        why += (f'Refitted without it, the model has an error of {before} on {data}; with it, '
-                f'{after}. ')
+    data = 'the --validate recordings' if is_validated else 'held-out blocks of the recordings'
+    why = _with_it(diagnosis, effect, diagnosis.remaining)
+    if not isnan(gain := effect.held_out_certainty):
+        why += (f'The model with it predicts {data} {"better" if gain > 0 else "worse"}, by '
+                f'{plain(abs(gain), 2)} standard errors. ')
         why += '' if is_validated else 'Another motion (--validate) is stronger evidence. '
     why += f'Evidence {effect.evidence:.0f} (threshold 0)'
     why += '.' if effect.without is None else (
@@ -416,16 +415,37 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    found, unit = rival.found, diagnosis.residuals.unit
+    found = rival.found
     card, title = found.effect.card, _title(diagnosis, found)
-    held_out = '' if isnan(found.held_out_after) else (
-        f', and {in_unit(found.held_out_after, unit)} on held-out data')
     return Finding(
         f'or {title}', f'{title} explains the data about as well as {rival.of}: '
         f'{_parameters(diagnosis, found)}.',
-        f'With it the error is {in_unit(found.error_after, unit)}{held_out}. '
-        f'The set costs {plain(rival.cost, 2)} more than the best one.', sentence(card.causes),
-        sentence(card.confirm), sentence(card.looks_like))
+        f'{_with_it(diagnosis, found, rival.remaining)}The set costs {plain(rival.cost, 2)} more '
+        'than the best one.', sentence(card.causes), sentence(card.confirm),
+        sentence(card.looks_like))
+
+
+def _with_it(diagnosis: Diagnosis, effect: FoundEffect, remaining: Array) -> str:
+    drive, before, after = largest_fall(diagnosis, remaining + effect.force, remaining)
+    return (f'With it the error of {drive} '
+            f'{change(before, after, diagnosis.residuals.units_of(drive).effort)}. ')
+
+
+def largest_fall(diagnosis: Diagnosis, error: Array, less: Array) -> tuple[str, float, float]:
+    """Return the drive on which the RMS error falls most in units of its noise, and both errors.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    error, less : (M, D) arrays
+    """
+    falls = []
+    for drive, noise in diagnosis.noise_floors.items():
+        d = diagnosis.residuals.drives.index(drive)
+        before, after = (root_mean_square(values[:, d]) for values in (
+            error, less))
+        falls.append(((before - after) / max(noise, 1e-300), drive, before, after))
+    return max(falls)[1:]
 
 
 def _parameters(diagnosis: Diagnosis, effect: FoundEffect) -> str:

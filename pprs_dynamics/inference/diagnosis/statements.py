@@ -73,15 +73,17 @@ class Statement(JsonRecord):
     Parameters
     ----------
     drive, variable : str
+        Whose error depends on which variable.
     range : (float, float) or None
-        Of the variable, SI; of the speed where the pattern follows the direction of motion;
-        [0, 1] or [-1, 0] of the direction; None where all of it is meant.
+        Range of the variable, SI: of the speed where the pattern follows the direction of motion;
+        [0, 1] or [-1, 0] of the direction; None for all values.
     share_of_error : float
-        Of the drive's squared error, within the range; without a range, what the pattern
-        explains.
+        Share of the drive's squared error within the range; without a range, the share that the
+        pattern explains.
     share_of_time : float
-        Of the samples, within the range.
+        Share of the samples within the range.
     text : str
+        The statement in words.
     evidence : float
         By which the cost rises without it.
     kind : str

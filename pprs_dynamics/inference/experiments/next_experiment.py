@@ -55,16 +55,17 @@ class PurposeError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class ExpectedEvidence(JsonRecord):
+class ExpectedEvidence:
     """Expected evidence of a motion in one contest.
 
     Parameters
     ----------
     truth, rival : str
+        The effect that is assumed to be there, and the one that is compared with it.
     evidence_now, expected_evidence : float
-        By how much the rival costs more in a diagnosis: of the recordings, and with the motion.
+        Cost of the rival above that of the truth: of the recordings, and with the motion.
     probability : float
-        That the rival falls behind by what a diagnosis asks for.
+        Probability that a diagnosis then excludes the rival.
     """
 
     truth: str
@@ -75,16 +76,17 @@ class ExpectedEvidence(JsonRecord):
 
 
 @dataclass(frozen=True)
-class Accuracy(JsonRecord):
+class Accuracy:
     """How well a number would be known.
 
     Parameters
     ----------
     label, unit : str
+        The number.
     scale : float
-        Size at which it matters, or the tolerance's standard deviation.
+        Size at which it matters, or the standard deviation of its tolerance.
     std_before, std_after : float
-        Standard deviations.
+        Standard deviation without and with the motion.
     """
 
     label: str
@@ -101,25 +103,30 @@ class Experiment(JsonRecord):
     Parameters
     ----------
     kind : {'separate', 'estimate', 'commission'}
+        What the motion is for.
     subjects : tuple of str
         Effects in question.
     contests : tuple of ExpectedEvidence
+        Expected evidence between every two of them.
     accuracies : tuple of Accuracy
+        How well numbers would be known.
     limits : dict of str to float
         Use of each limit, its margin taken off: at most 1.
     duration : float
-        [s]
+        Duration of the motion [s].
     motion : callable
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     model : DriveModel
     determined, total : int, optional
-        Of the first motion of a robot: combinations of the numbers of its model and of common
-        effects that it determines better than the size at which they matter, and all.
+        Of a first motion: how many combinations of the model's numbers it determines better than
+        the size at which they matter, and all of them.
     """
 
-    json_keys = ('separates', 'does_not_separate=fails', 'expected_evidence', 'load',
-                 'separated_by_load', 'question=kind', 'subjects', 'text', 'contests',
-                 'accuracy=accuracies', 'limits', 'duration', 'determined?', 'total?')
+    json_keys = ('separates', 'does_not_separate', 'expected_evidence', 'load',
+                 'separated_by_load', 'question', 'subjects', 'text', 'contests', 'accuracy',
+                 'limits', 'duration', 'determined', 'total')
+    json_attributes = (('question', 'kind'), ('accuracy', 'accuracies'))
+    json_optional = ('determined', 'total')
 
     kind: str
     subjects: tuple[str, ...]
@@ -138,7 +145,7 @@ class Experiment(JsonRecord):
 
     @property
     def expected_evidence(self) -> float:
-        """The least of all contests that it decides; of all where it decides none."""
+        """Least expected evidence of the pairs that it separates; of all if it separates none."""
         decided = [c for c in self.contests if c.probability >= SURE] or self.contests
         return min((contest.expected_evidence for contest in decided), default=0.0)
 
@@ -158,14 +165,15 @@ class Experiment(JsonRecord):
         return tuple(pair for pair, is_separated in self.pairs.items() if is_separated)
 
     @property
-    def fails(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that it does not, or not in every case."""
+    def does_not_separate(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that it does not separate, or not in every case."""
         return tuple(pair for pair, is_separated in self.pairs.items() if not is_separated)
 
     @property
     def separated_by_load(self) -> tuple[tuple[str, str], ...]:
         """Pairs that no motion separates, but the same motion with another load does."""
-        return tuple(pair for pair in self.fails if frozenset(pair) in SEPARATED_BY_LOAD)
+        return tuple(pair for pair in self.does_not_separate
+                     if frozenset(pair) in SEPARATED_BY_LOAD)
 
     @property
     def load(self) -> float | None:
@@ -187,9 +195,9 @@ class Experiment(JsonRecord):
         if self.separates:
             found.append(f'This motion separates {_listed(self.separates)}. The expected evidence '
                          f'is {self.expected_evidence:.0f} (10 are odds of 150 to 1).')
-        if self.fails:
-            found.append(f'It hardly separates {_listed(self.fails)}: no motion within the limits '
-                         'was found that does.')
+        if self.does_not_separate:
+            found.append(f'It hardly separates {_listed(self.does_not_separate)}: no motion within '
+                         'the limits was found that does.')
         if self.load:
             found.append(f'For {_listed(self.separated_by_load)} record the same motion once more '
                          f'with {self.load:g} kg more at the tool, and diagnose that recording '

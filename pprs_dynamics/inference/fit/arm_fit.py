@@ -47,7 +47,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
-from pprs_dynamics.system.json_records import JsonRecord
 
 LEAST_MASS = 1e-3  # [kg]; links without mass are given this, and
 LEAST_RADIUS = 0.02  # [m] this radius: thin rods of a drawing have none across
@@ -68,7 +67,7 @@ STANDS = 0.05  # share of the samples in which a joint must move for its frictio
 
 
 @dataclass(frozen=True)
-class FittedNumber(JsonRecord):
+class FittedNumber:
     """A number of the model, before and after, with its standard deviation."""
 
     key: str

@@ -42,28 +42,29 @@ class BaseFit(JsonRecord):
     ----------
     model : DriveModel
     numbers : tuple of FittedNumber
+        Numbers of the model, before and after the fit.
     notes : tuple of str
         What the motion determines and what it does not, as sentences.
-    before, after : dict of str to float
-        rms error by drive on the recordings: of the input model, and of the fitted one.
+    error_before, error_after : dict of str to float
+        RMS error of each drive with the input model, and with the fitted one [N, N m].
     held_out : dict of str to float
-        That of the fitted model on held-out data.
+        RMS error of each drive on held-out data [N, N m].
     held_out_on : {'recordings', 'halves', 'validation'}
-        Each recording, or half of the only one, predicted from the others; or the validation.
+        Each recording, or half of the only one, predicted from the others; or --validate.
     explained : dict of str to float
         Share of each drive's effort that the fitted model explains.
     little : dict of str to float
         Drives of whose effort the fitted model explains little, with the shares.
     """
 
-    json_keys = ('numbers', 'error_before=before', 'error_after=after', 'notes', 'held_out',
-                 'held_out_on', 'explained')
+    json_keys = ('numbers', 'error_before', 'error_after', 'notes', 'held_out', 'held_out_on',
+                 'explained')
 
     model: DriveModel
     numbers: tuple[FittedNumber, ...]
     notes: tuple[str, ...]
-    before: dict[str, float]
-    after: dict[str, float]
+    error_before: dict[str, float]
+    error_after: dict[str, float]
     held_out: dict[str, float]
     held_out_on: str
     explained: dict[str, float]

@@ -25,7 +25,6 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.json_records import JsonRecord
 
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
@@ -35,24 +34,23 @@ REVERSAL, FORM = 'reversal', 'form'
 
 
 @dataclass(frozen=True)
-class CostTerms(JsonRecord):
+class CostTerms:
     """Terms of a cost, each -2 ln of a probability but for a constant; they add up to it.
 
     Parameters
     ----------
     fit : float
-        The residual in units of its noise, and ln of the noise.
+        Misfit: the residual in units of its noise, and ln of the noise.
     coefficients : float
-        The prior of the coefficients: how far they are from its mean, and how much narrower than
-        it they are known.
+        Prior of the coefficients: distance from its mean, and gain of precision over it.
     names : float
-        Of what is claimed, with the odds of one more effect, of a zero, a gain or a pattern.
+        Choice of the effects, with the odds of one more effect, of a zero, a gain or a pattern.
     drives : float
-        How many, and which.
+        Choice of the drives.
     shapes : float
-        Variants and shapes, among those tried.
+        Choice of variants and shapes among those tried.
     signs : float
-        Less than nothing for physical ones.
+        Signs of coefficients; negative for physical ones.
     feasibility : float
         By how much possible bodies, and friction and inertia that are not negative, fit worse
         than those of the least squares.

@@ -36,7 +36,7 @@ FREE = 1e-2
 
 
 @dataclass(frozen=True)
-class Estimate(JsonRecord):
+class Estimate:
     """A fitted value and its standard deviation."""
 
     value: float
@@ -54,7 +54,8 @@ class Calibration(JsonRecord, Number):
         Its fitted value and standard deviation.
     """
 
-    json_keys = ('key=label', 'before=value', 'after', 'std', 'unit')
+    json_keys = ('key', 'before', 'after', 'std', 'unit')
+    json_attributes = (('key', 'label'), ('before', 'value'))
 
     after: float
     std: float

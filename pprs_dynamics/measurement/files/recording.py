@@ -118,14 +118,14 @@ class DriveSummary:
 
     Parameters
     ----------
-    position, effort : (lowest, highest)
-        [m], [N]; the latter None where it was never measured.
-    velocity : (lowest, highest) or None
-        As recorded [m/s].
+    position : (lowest, highest)
+        Range [m, rad].
+    velocity, effort : (lowest, highest) or None
+        Range as recorded [m/s, rad/s], [N, N m]; None where it was never measured.
     measured : float
         Share of the samples with an effort, 0 to 1.
     channels : mapping of str to (lowest, highest)
-        Of further quantities that were measured, by name.
+        Ranges of further quantities, by name.
     """
 
     position: tuple[float, float]
@@ -152,21 +152,25 @@ class Summary:
     Parameters
     ----------
     name, source : str
+        Name of the file, and its format.
     samples : int
-        All that were kept.
+        Samples without the discarded ones.
     used : int
-        Those in segments.
+        Samples in segments.
     epoch : int
-        [s].
+        Unix time from which the other times are counted [s].
     start, end : float
         First and last time [s].
     duration : float
-        Of all segments together [s].
+        Duration of all segments together [s].
     rate : float
         Samples per second in the segments, from the median step; NaN without segments.
     segments : tuple of SegmentSummary
+        Parts without a gap.
     drives : dict of DriveSummary
+        Range of each drive's quantities.
     findings : tuple of Defect
+        What looks wrong.
     """
 
     name: str

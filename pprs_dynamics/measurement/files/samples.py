@@ -86,13 +86,13 @@ class Defect:
     Parameters
     ----------
     kind : str
-        A key of `POLICY`.
+        Kind of the defect, a key of `POLICY`.
     count : int
-        How many samples, places, columns, ... it concerns.
+        Number of samples, places or columns that it concerns.
     what : str
         The defect, as a clause.
     spans : tuple of (start, end)
-        Where, in the recording's time [s]; the first 100 places. Empty where it has no place.
+        The first 100 places, in the recording's time [s]; empty where it has no place.
     drives : tuple of str
         The drives concerned; empty where it concerns all.
     """

@@ -40,23 +40,23 @@ class StickSlip(JsonRecord):
     Parameters
     ----------
     frequency : float
-        [Hz]
+        Slips per second [Hz].
     speed : float
         Largest mean speed at which it was seen [m/s, rad/s].
     step : float
         Travel of a slip [m, rad].
     slips : int
-    share : float
-        Of the recording's time.
+    share_of_time : float
+        Share of the recording.
     """
 
-    json_keys = ('frequency', 'speed', 'step', 'share_of_time=share')
+    json_keys = ('frequency', 'speed', 'step', 'share_of_time')
 
     frequency: float
     speed: float
     step: float
     slips: int
-    share: float
+    share_of_time: float
 
 
 def sticking_drives(recordings: Sequence[Recording]) -> dict[str, StickSlip]:

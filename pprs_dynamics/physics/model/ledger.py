@@ -32,36 +32,38 @@ class Step(JsonRecord):
     Parameters
     ----------
     effect : str
+        Its name.
     recordings, sha256 : tuple of str
-        Fitted to, and the hashes of the files.
+        Fitted recordings, and the hashes of their files.
     spans : tuple of float
-        First and last time of each [s].
+        First and last time of each recording [s].
     held_out_on : {'blocks', 'validation'}
+        Held-out data: blocks of the recordings, or those of --validate.
     error_before, error_after, held_out_before, held_out_after, noise_floor : float
-        [N]
+        RMS errors on fitted and on held-out data, and RMS of the noise [N].
     date, version : str
-        When, and by which version of the package.
+        Date, and version of the package.
     forced : bool
         Whether objections were overridden.
-    parameters : tuple of str
-        drive.parameter, or parameter; then values, standard deviations and units of each.
+    parameters, values, std, units : tuples
+        Names (drive.parameter, or parameter), values, standard deviations and units.
     drives : tuple of str
-        On which it sits; none for effects in the structure.
+        Drives that it is on; none for effects in the structure.
     measured, drive_errors_before, drive_errors_after : tuples
-        Drives that were measured, and the error on each [N].
+        Drives that were measured, and the RMS error of each [N].
     validation, validation_sha256 : tuple of str
-        Recordings that were not fitted.
+        Recordings that were not fitted, and the hashes of their files.
     reference : tuple of str
-        Runs since which it is a change; none where the model lacked it all along.
+        Reference runs since which it is a change.
     objections, rivals, calibrated : tuple of str
-        What was overridden; effects that explain the data as well; numbers that moved.
+        Overridden objections; effects that explain the data as well; numbers that moved.
     previous : mapping
-        Values that the step changed, as they were.
+        Earlier values of the keys that the step changed.
     added, removed : tuple of str
-        Keys that were not there before, and those that are not there any more.
+        Keys that the step added to the model file, and that it removed.
     """
 
-    json_keys = ('*', 'drives=on_drives')
+    json_attributes = (('drives', 'on_drives'),)
 
     effect: str
     error_before: float

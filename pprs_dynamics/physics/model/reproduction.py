@@ -39,8 +39,9 @@ class Claim:
     Parameters
     ----------
     claim, paper, found : str
-        What is claimed, the paper's figure or wording, ours.
+        The subject, what the paper says about it, and what this model gives.
     reproduced : bool
+        Whether both agree.
     """
 
     claim: str

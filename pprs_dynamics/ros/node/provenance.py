@@ -16,14 +16,13 @@ from typing import Any
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
-from pprs_dynamics.system.json_records import JsonRecord
 from pprs_dynamics.system.plain_text import displayed
 
 OPTION = '--params-file'
 
 
 @dataclass(frozen=True)
-class Provenance(JsonRecord):
+class Provenance:
     """Provenance of the model that is in force on a node.
 
     Parameters
@@ -31,7 +30,7 @@ class Provenance(JsonRecord):
     files : list of dict
         `file` and `sha256` of each parameter file.
     sha256 : str
-        Of the model.
+        Hash of the model.
     """
 
     files: list[dict[str, str]]

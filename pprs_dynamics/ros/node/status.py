@@ -35,7 +35,7 @@ TOLD_AS = {'STALE': 'ERROR'}
 
 
 @dataclass
-class DurationSummary(JsonRecord):
+class DurationSummary:
     """Quantiles of the last thousand durations [s]; null where there was none."""
 
     p50: float | None = None
@@ -50,12 +50,13 @@ class NodeStatus(JsonRecord):
     Parameters
     ----------
     level : Level
+        How severe the condition is.
     code : Code
         What the condition is.
     message : str
         The condition in a sentence.
     counters : dict of str to int
-        Since the start; rejections by their code.
+        Counts since the start; rejections by their code.
     robot : str
         Which robot the node's model describes.
     model : Provenance
@@ -63,7 +64,7 @@ class NodeStatus(JsonRecord):
     changes : int
         Changes of the model that `~/restore` can undo.
     state : str
-        Of the managed node.
+        State of the managed node.
     preparing : bool
         The equations are being compiled: answers take longer.
     assumed : dict of str to str
@@ -85,7 +86,9 @@ class NodeStatus(JsonRecord):
         Where goals are sent to.
     """
 
-    json_keys = ('*?', 'level', 'code', 'message', 'counters')
+    json_optional = ('robot', 'model', 'changes', 'state', 'preparing', 'assumed', 'rate',
+                     'compute_time', 'lag', 'lagging', 'compared_share', 'singularity_margin',
+                     'workspace_margin', 'error', 'action')
 
     level: Level
     code: Code

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -84,11 +84,6 @@ class Replayed:
 
     error: Array
     effort: Array
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as data for JSON."""
-        return {'replay_error': root_mean_square(self.error),
-                'effort': root_mean_square(self.effort)}
 
 
 def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Replayed:
