@@ -41,7 +41,7 @@ def _is_missing(value: object) -> bool:
 
 
 def root_mean_square(values: ArrayLike) -> float:
-    """Return the root of the mean square of what is known; NaN where nothing is."""
+    """Return the root mean square of the values that are not NaN; NaN without any."""
     numbers = np.asarray(values)
     known = numbers[~np.isnan(numbers)]
     return float(np.sqrt(np.mean(known ** 2))) if known.size else np.nan

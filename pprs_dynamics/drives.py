@@ -89,7 +89,7 @@ class DriveColumns(NamedTuple):
 
 
 class RecordedColumns(NamedTuple):
-    """How tables hold a recording; what is not said is as in our own format.
+    """Layout of a table of recorded columns; the default is the format of this package.
 
     Parameters
     ----------

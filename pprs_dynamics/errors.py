@@ -47,7 +47,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def beside(path: object) -> str:
-    """Return the name of a file in the same folder that is like one that does not exist."""
+    """Return the name of a similar file in the folder of a file that does not exist."""
     folder, name = os.path.split(os.fspath(path) if isinstance(path, os.PathLike) else str(path))
     try:
         with os.scandir(folder or '.') as entries:
@@ -134,7 +134,7 @@ class UnknownNameError(ModelError):
 
     @property
     def hint(self) -> str:
-        """What to write instead: the name that is like it, or those that there are."""
+        """The similar name to use, or all known names."""
         if self.instead:
             return f'use {self.instead}'
         close = meant(self.value, self.known) if len(self.known) > 1 else ''
@@ -144,7 +144,7 @@ class UnknownNameError(ModelError):
 
 
 class UnreadableFileError(PprsError, OSError):
-    """A file that does not exist, cannot be read, or is not what it should be."""
+    """A file that does not exist, cannot be read, or has an unexpected content."""
 
     def __init__(self, path: object, reason: str) -> None:
         if reason == os.strerror(errno.ENOENT):
@@ -239,7 +239,7 @@ class LimitError(PprsError, ValueError):
 
 
 class EffectError(PprsError, RuntimeError):
-    """An effect of another package failed, or returned what it must not.
+    """An effect of another package failed, or returned an invalid value.
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ CHANGES = (('nothing', '', 0, 1.0), ('Coulomb wrist_2 + 10 %', 'friction.coulomb
            ('viscous elbow + 10 %', 'friction.viscous', 2, 1.1))
 
 
-def told(found: dict[str, Any]) -> str:
-    """Return what a diagnosis tells first, beside it, and how sure."""
+def summary(found: dict[str, Any]) -> str:
+    """Return the verdict, the effects with the values of the first, and the rivals of an answer."""
     if not found:
         return 'not measured'
     effects = found['effects']
@@ -51,18 +51,18 @@ def told(found: dict[str, Any]) -> str:
                        for key, number in list(known.items())[:4] if number.get('std') is not None)
     rivals = sorted({name for row in found['indistinguishable'] for name in row[1:]})
     return (f'{found["verdict"]}: **{first["name"]}** ({values})'
-            + (f'; beside it {", ".join(other["name"] for other in others)}' if others else '')
+            + (f'; also {", ".join(other["name"] for other in others)}' if others else '')
             + (f'; rivals {", ".join(rivals)}' if rivals else '')
             + f'; {len(found["depends_on"])} patterns; {found["processor_seconds"]:.0f} s')
 
 
 def since(bench: Bench, name: str, recording: str, model: str, old: str, *reference: str,
           ) -> list[str]:
-    """Return a row: what is told without a reference, by the model `old`, and since it."""
+    """Return a row: the answers without a reference, by the model `old`, and since it."""
     before = bench.run(f'{name}_old', 'diagnose', recording, '--model', old)
     after = bench.run(f'{name}_new', 'diagnose', recording, '--model', model,
                       '--reference', *reference)
-    return [name.replace('_', ' '), told(before), told(after)]
+    return [name.replace('_', ' '), summary(before), summary(after)]
 
 
 def surgical_arm(bench: Bench) -> list[list[str]]:

@@ -177,7 +177,7 @@ def worded(mass: dict[str, float]) -> str:
     return f'{mass["value"]:.3f} ± {2 * mass["std"]:.3f} kg'
 
 
-def holds(mass: dict[str, float]) -> bool:
+def contains_truth(mass: dict[str, float]) -> bool:
     """Return whether the interval contains what the load weighs."""
     return abs(mass['value'] - MASS) <= 2 * mass['std']
 
@@ -204,7 +204,7 @@ def load_rows(bench: Bench) -> tuple[list[list[str]], int, int, int]:
                 continue
             first += 1
             near += abs(mass['value'] / MASS - 1) < 0.03
-            held += holds(mass)
+            held += contains_truth(mass)
             rows[-1].append(worded(mass))
     return rows, first, near, held
 
@@ -296,14 +296,14 @@ def tell(bench: Bench) -> dict[str, str]:
     seconds = sorted(outcome['processor_seconds'] for outcome in (load, free) if outcome)
     value = 'none' if mass is None else (
         f'{worded(mass)} ({100 * (mass["value"] / MASS - 1):+.1f} %, '
-        f'{"holds" if holds(mass) else "does not hold"} {MASS} kg)')
+        f'{"contains" if contains_truth(mass) else "does not contain"} {MASS} kg)')
     taken = first_mass(hand)
     without_hand = ', '.join(effect['name'] for effect in hand.get('effects', ())) or 'not measured'
     proof = [
-        ['the load is named first, mass within 3 %, its interval holds 2.805 kg', 'yes',
+        ['the load is named first, mass within 3 %, its interval contains 2.805 kg', 'yes',
          f'{first} first; {value}'],
         ['the same with a base of one free run each, on the whole run and its halves', 'all',
-         f'{load_first} of {count} first, {load_near} within 3 %, {load_held} hold it'],
+         f'{load_first} of {count} first, {load_near} within 3 %, {load_held} contain it'],
         [f'a hand of {HAND} kg in the model that is not there: first, within 5 %, no zeros', 'yes',
          without_hand if taken is None else
          f'first; {worded(taken)}; all: {without_hand}'],

@@ -180,7 +180,7 @@ def table(found: Sequence[Outcome]) -> str:
     failed = len(found) - len(told)
     if failed:
         lines.append(f'| refused or failed | 0 | {failed} |')
-    lines += ['', '| hidden | on | said |', '|---|---|---|']
+    lines += ['', '| hidden | on | reported |', '|---|---|---|']
     for outcome, judged in told:
         if judged.get('claimed') or not all(
                 right for what, right in judged.items() if what.startswith('exact')):

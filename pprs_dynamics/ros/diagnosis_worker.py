@@ -89,7 +89,7 @@ class StreamWindows:
 
 
 class DiagnosisWorker:
-    """A process that diagnoses one window after the other, and remembers what it found.
+    """A process that diagnoses windows one after the other, and stores the reported effects.
 
     It is ended with the node, and started anew where it ended by itself.
     """
@@ -122,7 +122,7 @@ class DiagnosisWorker:
             return None
         except EndedError:
             self.close()
-            return {'error': 'the process that diagnoses has ended; what it knew is forgotten'}
+            return {'error': 'the diagnosis process has ended; its state is lost'}
         self.busy = False
         return answer
 
@@ -140,7 +140,7 @@ _LAST: list[tuple[Asked, LiveDiagnosis]] = []  # at most one, in the process tha
 
 
 def _diagnosed(asked: Asked, samples: StreamWindow, progress: Any) -> dict[str, Any]:
-    """Return the answer to a window, with what earlier windows of the same model said."""
+    """Return the live diagnosis after a window of the same model."""
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.inference.fit.reference_runs import read_reference

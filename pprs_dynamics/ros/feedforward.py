@@ -78,7 +78,7 @@ class FeedforwardNode(ManagedNode):
             self, arguments, parameters, self._use_settings, drives=True)
         node_values = self._settings.node_values
         for name, assumed in self._settings.model.assumed_at_start.items():
-            self.get_logger().info(f'{name} begins anew: {assumed}')
+            self.get_logger().info(f'the memory of {name} is reset: {assumed}')
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         self._names = names = RobotNames.of(self._settings.model, node_values['frame_id'])
@@ -149,9 +149,9 @@ class FeedforwardNode(ManagedNode):
         super().destroy_topics()
         if self._watchdog is not None:
             self._watchdog.destroy()
-        for each in (*self._parts.values(), self._current):
-            if each is not None:
-                self.destroy_publisher(each)
+        for topic in (*self._parts.values(), self._current):
+            if topic is not None:
+                self.destroy_publisher(topic)
         self._watchdog = self._current = None
         self._parts = {}
 
@@ -255,7 +255,7 @@ class FeedforwardNode(ManagedNode):
             report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
         elif left.singularity is not None and left.singularity < node_values['warning_margin']:
             report('WARN', 'NEAR_SINGULAR', f'{left.singularity:.3f} of the way to the limits of '
-                   f'conditioning is left, warning_margin is {node_values["warning_margin"]:g}')
+                   f'conditioning remains, warning_margin is {node_values["warning_margin"]:g}')
         elif left.workspace < node_values['warning_margin']:
             report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
                    f'range left, warning_margin is {node_values["warning_margin"]:g}')
@@ -347,7 +347,7 @@ class FeedforwardNode(ManagedNode):
         action = self._settings.node_values['timeout_action']
         left = 0 if self._watchdog is None else self._watchdog.left
         if action == SILENT:
-            return 'nothing goes out, the last command stays in force'
+            return 'nothing is published, the last command remains in force'
         gravity = action == HOLD_GRAVITY
         try:
             held = self._feedforward.hold(gravity, left)
@@ -356,7 +356,7 @@ class FeedforwardNode(ManagedNode):
             self._send_setpoint(setpoint, self.get_clock().now().nanoseconds)
             controller = self._end_trajectory(held, left, gravity)
         except PprsError as error:
-            return f'the last command stays in force, as none can be given: {error}'
+            return f'the last command remains in force, no new one can be computed: {error}'
         failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
         pose = 'the last pose' if left <= 0 else 'the pose on the path'
         done = f'{pose} is held at rest' if gravity else 'efforts are zero'

@@ -44,32 +44,32 @@ _PARAMETERS = (
     FRAME,
     node_parameter('max_age', 0.1, 'oldest header stamp that is accepted, and longest time since a '
                    'message without one was sent [s]; 0: any', lower=0),
-    node_parameter('max_ahead', 0.5, 'how far ahead of its moment a first point is accepted, which '
+    node_parameter('max_ahead', 0.5, 'longest time by which a first point may be early; it '
                    'is executed at once [s]; 0: any', lower=0),
     node_parameter('max_duration', 600.0, 'longest trajectory that is accepted [s]: its command is '
                    'not stale before its end', lower=0.001, upper=3600),
     node_parameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
                    'reject the message, or take them from a spline through the points',
                    choices=(REJECT, SPLINE)),
-    node_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
-                   'than 1 while a robot is commissioned', lower=0, upper=1),
-    node_parameter('ramp_time', RAMP_TIME, 'in which efforts change to those of a changed model or '
-                   'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
-    node_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
-                   'followed by one at rest [s]; below 1 ms: none is', lower=0, upper=10),
-    node_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
-                   'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
+    node_parameter('feedforward_scale', 1.0, 'multiplies every published effort [1]: less than 1 '
+                   'during commissioning', lower=0, upper=1),
+    node_parameter('ramp_time', RAMP_TIME, 'duration of the change of efforts when the model or '
+                   'feedforward_scale changes [s]; 0: at once', lower=0, upper=60),
+    node_parameter('stop_time', 0.0, 'time from a moving last point of ~/joint_trajectory to an '
+                   'added point at rest [s]; below 1 ms: none is added', lower=0, upper=10),
+    node_parameter('effort_limits', (), 'largest published absolute effort, per drive [N, N m]; '
+                   'the smaller of this and the limit of the model counts', size=6, positive=True),
     node_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
                    'the effort to the limit', choices=(REJECT, CLAMP)),
-    node_parameter('command_timeout', 0.1, 'how long after the end of the last accepted '
-                   'trajectory its command goes stale [s]; 0: never', lower=0, upper=3600),
-    node_parameter('timeout_action', HOLD_GRAVITY, 'what goes out once when the command is '
-                   'stale: the efforts that hold the last pose at rest, zeros, or nothing',
+    node_parameter('command_timeout', 0.1, 'time from the end of the last accepted trajectory '
+                   'until its command is stale [s]; 0: never', lower=0, upper=3600),
+    node_parameter('timeout_action', HOLD_GRAVITY, 'what is published once when the command '
+                   'is stale: the efforts that hold the last pose at rest, zeros, or nothing',
                    choices=(HOLD_GRAVITY, ZERO, SILENT)),
-    node_parameter('warning_margin', 0.1, 'share of the way to a limit of workspace or '
-                   'conditioning that is left when warnings begin [1]', lower=0, upper=1),
-    node_parameter('lag_warning', 0.02, 'time that messages wait for the node, at the median, '
-                   'when warnings begin [s]; 0: never', lower=0, upper=3600),
+    node_parameter('warning_margin', 0.1, 'warn if less than this share of the way to a limit of '
+                   'workspace or conditioning remains [1]', lower=0, upper=1),
+    node_parameter('lag_warning', 0.02, 'warn if the median waiting time of messages is longer '
+                   '[s]; 0: never', lower=0, upper=3600),
 )
 
 
@@ -80,7 +80,7 @@ def parameters_for(drives: int) -> tuple[NodeParameter, ...]:
 
 
 class ForceCommand(NamedTuple):
-    """What goes out for a request.
+    """Command for a request.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class DriveTrajectory(NamedTuple):
 
     @property
     def ends_at_rest(self) -> bool:
-        """Whether the last point stands, by joint_trajectory_controller's own bound."""
+        """Whether the last point is at rest, by the bound of joint_trajectory_controller."""
         return bool((np.abs(self.drive_motion[1][-1]) <= STILL).all())
 
     def message(self, start: int, names: RobotNames) -> JointTrajectory:
@@ -170,7 +170,7 @@ class _Ramp(NamedTuple):
         return now >= self.since + self.duration
 
     def blended(self, motion: Motion, offsets: Indices, effort: Array, now: float) -> Array:
-        """Return efforts (N, D) on the way from those of before to those of now.
+        """Return efforts (N, D) that change over `ramp_time` from the previous ones to the new.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class _Ramp(NamedTuple):
 
 
 class Feedforward:
-    """The model in force, what its effects remember, and what may go out.
+    """The model in force with the memory of its effects and the limits of commands.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ class Feedforward:
         return self._scale * answer.forces.parts[name][0]
 
     def answer(self, request: TrajectoryRequest) -> ForceCommand:
-        """Return what goes out for a request.
+        """Return the command for a request.
 
         Raises
         ------
@@ -291,7 +291,7 @@ class Feedforward:
         return bool((abs(velocity[-1]) <= self._model.values[REVERSAL_VELOCITY]).all())
 
     def ending_at_rest(self, answer: ForceCommand, duration: float) -> DriveTrajectory:
-        """Return what goes to a trajectory controller: it comes to rest if nothing follows.
+        """Return a trajectory that ends at rest, for a trajectory controller.
 
         A last point in motion, where the drives would be for good without another message, is
         followed by one at rest with its gravity, a constant deceleration later. So is one that is
@@ -432,7 +432,7 @@ class Feedforward:
         return ForceCommand(request, forces, effort)
 
     def _ramped(self, request: TrajectoryRequest, effort: Array) -> Array:
-        """Return efforts (N, D) on the way from those before a change."""
+        """Return efforts (N, D) that change gradually after a change of the model."""
         ramp, now = self._ramp, self._clock()
         if ramp is None or ramp.is_over(now):
             self._ramp = None
@@ -452,7 +452,7 @@ class Feedforward:
 
 
 def limits_of(model: DriveModel, node_values: Mapping[str, Any]) -> DriveLimits:
-    """Return the limits of what goes out: of the model, and smaller ones of the node."""
+    """Return the limits of commands: those of the model, and smaller ones of the node."""
     given = node_values['effort_limits']
     return model.limits.with_efforts(given) if given else model.limits
 
@@ -462,8 +462,8 @@ def warn_without_limits(node: Node, model: DriveModel, node_values: Mapping[str,
     efforts = limits_of(model, node_values).efforts
     if free := [name for name, most in zip(model.drives, efforts, strict=True) if np.isinf(most)]:
         node.get_logger().warning(
-            f'no limit of effort is known for {", ".join(free)}: every finite effort that a '
-            'trajectory asks for goes out; set limits.effort in the model file, or effort_limits')
+            f'no limit of effort is known for {", ".join(free)}: every finite effort is '
+            'published; set limits.effort in the model file, or effort_limits')
 
 
 def _path_of(command: ForceCommand) -> DrivePath:

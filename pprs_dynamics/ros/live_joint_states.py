@@ -116,7 +116,7 @@ class LiveJointStates(Node):
         with suppress(PprsError):  # then the fingerprints differ, and nothing can be set
             self.stream.use_model(DriveModel.from_parameters({
                 **self.model.values,
-                **{each.name: plain_value(each.value) for each in parameters}}, self.model.source))
+                **{new.name: plain_value(new.value) for new in parameters}}, self.model.source))
 
     def _takers(self, full_name: str) -> list[str]:
         """Return the nodes that subscribe to a node's commands."""
@@ -174,14 +174,14 @@ class LiveJointStates(Node):
         with self.stream.lock:
             samples = list(self._ring)
         if not samples:
-            raise UnreadableFileError('joint_states', 'nothing has come in yet')
+            raise UnreadableFileError('joint_states', 'no message has arrived yet')
         # Here and not above: it brings multiprocessing, which this node does without.
         from pprs_dynamics.ros.diagnosis_worker import StreamWindow
 
         write_recording(path, StreamWindow.of(samples).recording('live', self.model.drives))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return how it stands, and what was left of late [N]."""
+        """Return state and latest residuals [N], for JSON."""
         now = time.monotonic()
         with self.stream.lock:
             running = self.stream.comparison.running_error().tolist()

@@ -29,7 +29,7 @@ PATIENCE = 2.0  # [s] without a comparison before the reason is reported
 
 
 class LiveStream:
-    """A subscription to joint states and the comparison of what comes.
+    """A subscription to joint states and their comparison with the model.
 
     The executor's thread takes messages and calls `compare`; other threads take `lock` to read.
 

@@ -49,21 +49,21 @@ except ImportError:  # it comes with a ROS 2 installation only
 PARAMETERS = (
     AUTOSTART,
     FRAME,
-    node_parameter('tf_prefix', '', 'of all frames on /tf: two robots need one each', stays=True),
-    node_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
-                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
-    node_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
+    node_parameter('tf_prefix', '', 'prefix of all frames on /tf: two robots need two', stays=True),
+    node_parameter('window', WINDOW, 'length of the smoothing that gives velocities and '
+                   'accelerations; answers lag by half [s]', lower=0.01, upper=2.0, stays=True),
+    node_parameter('error_span', ERROR_SPAN, 'time over which ~/error is averaged [s]', lower=0.05,
                    upper=600.0, stays=True),
-    node_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+    node_parameter('update_rate', 50.0, 'how often the new samples are compared [Hz]',
                    lower=1.0, upper=1000.0, stays=True),
-    node_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
-                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
+    node_parameter('diagnose_every', 0.0, 'period of the diagnosis of the latest window, '
+                   'in another process [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                    upper=3600.0, stays=True),
     node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
                    'windows are diagnosed for changes since then', stays=True),
-    node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
-                   'absolute or in the namespace of this one', stays=True),
+    node_parameter('feedforward', 'feedforward', 'node whose effects ~/adopt_confirmed sets; '
+                   'absolute, or in the namespace of this node', stays=True),
 )
 
 # `~/diagnosis` before the first window that was diagnosed.
@@ -164,7 +164,7 @@ class MonitorNode(ManagedNode):
         self._latest: tuple[int, Array] | None = None
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Compare what comes from now on."""
+        """Start the comparison."""
         self._begin_stream()
         self.get_logger().info(
             f'answers lag by half the window of {self._settings.node_values["window"]:g} s; ready')
@@ -283,7 +283,7 @@ class MonitorNode(ManagedNode):
                 answer = {**NOTHING, **answer, 'note': error}
             changed = answer.get('text', '')
             if changed != self._changed:
-                self.get_logger().warning(changed or 'what had changed is gone')
+                self.get_logger().warning(changed or 'the reported change has ended')
             self._changed = changed
             self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:

@@ -50,12 +50,12 @@ PARAMETERS = (
     # joint_trajectory_controller drops it; messages took 11.5 ms at the median where it did.
     node_parameter('points', 10, 'points per message: the present one and those that follow',
                    lower=1),
-    node_parameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
+    node_parameter('repeat', 1, 'number of repetitions; 0: until stopped', lower=0),
     node_parameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
-    node_parameter('seed', 0, 'of an excitation', lower=0),
+    node_parameter('seed', 0, 'seed of an excitation', lower=0),
     node_parameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
                    '0: start there', lower=0),
-    node_parameter('ahead', 0.02, 'how far ahead of its moment each message is stamped [s]',
+    node_parameter('ahead', 0.02, 'time from sending a message to its stamp [s]',
                    lower=0),
 )
 
@@ -70,7 +70,7 @@ OF_JOINTS = tuple(parameter for parameter in with_changed(
 
 
 class PlayTrajectoryNode(Node):
-    """Publishes one message per period, once somebody listens on `feedforward/trajectory`.
+    """Publishes one message per period, once `feedforward/trajectory` has a subscriber.
 
     With the model file of an arm or of a robot with loops it plays an excitation of its drives.
     """
@@ -160,7 +160,7 @@ def _joints(node: Node, values: dict[str, Any], arguments: Sequence[str],
     model = declared_model(node, arguments, values)
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
     # One step beyond the end, which is where it began, at rest.
-    motion = JointMotion(*(np.concatenate((each, each[:1])) for each in (
+    motion = JointMotion(*(np.concatenate((values, values[:1])) for values in (
         drawn.position, drawn.velocity, drawn.acceleration)))
     return motion, partial(conversions.write_joint_trajectory, names=RobotNames.of(model))
 

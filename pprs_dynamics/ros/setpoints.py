@@ -28,7 +28,7 @@ class SetpointQueue:
         self._told: tuple[object, object] = (None, None)
 
     def add(self, time: float, setpoint: Setpoint) -> None:
-        """Take a setpoint for a time [s]; what waits for the same or a later time is replaced."""
+        """Store a setpoint for a time [s]; setpoints of the same or a later time are replaced."""
         while self._waiting and self._waiting[-1][0] >= time:
             self._waiting.pop()
         self._waiting.append((time, setpoint))

@@ -42,23 +42,23 @@ from pprs_dynamics.simulation.simulated_robot import (
 )
 
 PARAMETERS = (
-    node_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
-    node_parameter('bandwidth', BANDWIDTH, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+    node_parameter('rate', 500.0, 'rate of joint_states [Hz]', lower=10, upper=500),
+    node_parameter('bandwidth', BANDWIDTH, 'natural frequency of the PD loop at home [Hz]', lower=0,
                    upper=50),
     node_parameter('damping_ratio', DAMPING_RATIO, 'of the PD loop [1]', lower=0, upper=10),
     node_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                    'false: it is ignored, and the PD loop compensates gravity by itself'),
-    node_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
-                   '0: never', lower=0, upper=3600),
-    node_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
-    node_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
-    node_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
-                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
-    node_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
-                   'or random for one drawn at random; drives may follow: '
+    node_parameter('command_timeout', 0.1, 'time without a command after which the drives hold '
+                   'their positions [s]; 0: never', lower=0, upper=3600),
+    node_parameter('actuation_delay', 0.0, 'delay from command to force [s]', lower=0, upper=1),
+    node_parameter('encoder_resolution', 1e-6, 'step of positions; 0: none [m, rad]', lower=0),
+    node_parameter('effort_noise', 0.005, 'standard deviation of the noise (64 % white, 36 % '
+                   'coloured) over the largest effort of an excitation [1]', lower=0, upper=1),
+    node_parameter('hidden_effects', (), 'names of effects that the model lacks, or random for a '
+                   'random one; drives may follow: '
                    'coulomb_friction:lift_1,lift_2'),
-    node_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
-    node_parameter('seed', 0, 'of noise and hidden effects', lower=0),
+    node_parameter('hidden_scale', 1.0, 'multiplies the strength of hidden effects', lower=0),
+    node_parameter('seed', 0, 'seed of noise and hidden effects', lower=0),
 )
 # What changes while the robot runs: injected effects, and parameters of ROS 2 itself.
 CHANGEABLE = ('hidden_effects', 'seed', 'hidden_scale')
@@ -115,8 +115,8 @@ class SimulatedRobotNode(Node):
             if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
                 raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
                                  f'robot only {", ".join(CHANGEABLE)} change')
-        values = {each.name: each.check(after.get(each.name)) for each in PARAMETERS
-                  if each.name in CHANGEABLE}
+        values = {known.name: known.check(after.get(known.name)) for known in PARAMETERS
+                  if known.name in CHANGEABLE}
         self._robot.plant.choices(*(values[name] for name in CHANGEABLE))
         return values
 
@@ -130,8 +130,8 @@ class SimulatedRobotNode(Node):
 
     def _injected(self) -> str:
         """Return the injected effects in words."""
-        return '; '.join(f'{each["name"]} {each["parameters"]}'
-                         for each in self._robot.plant.injected) or 'none'
+        return '; '.join(f'{effect["name"]} {effect["parameters"]}'
+                         for effect in self._robot.plant.injected) or 'none'
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time

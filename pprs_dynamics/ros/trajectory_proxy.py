@@ -59,7 +59,7 @@ from pprs_dynamics.ros.node.status import StatusReporter
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
 ACTION = node_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
-                        'of the controller that the goals are passed on to', stays=True)
+                        'action of the controller that receives the goals', stays=True)
 TIMEOUT = node_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
                          'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal

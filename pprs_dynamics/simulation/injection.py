@@ -215,7 +215,7 @@ class Injecting:
         return self.scale * float(self.random.uniform(low, high))
 
     def inject_one(self, choice: Choice, effect: Callable[[Any], Injected]) -> dict[str, Any]:
-        """Inject an effect and return what is true about it."""
+        """Inject an effect and return its true parameters."""
         self.choice, self.random, self.scale = choice, choice.random, choice.scale
         drives, parameters = effect(self)
         return {'name': choice.name, 'drives': drives, 'parameters': parameters}

@@ -155,7 +155,7 @@ class Plant(Injecting):
         self.inertia = alone * np.sqrt(lightest)
 
     def inject(self, names: Sequence[str], seed: int = 0, scale: float = 1.0) -> None:
-        """Inject effects in place of those before; the motion goes on.
+        """Replace the injected effects; the motion continues.
 
         Parameters
         ----------
@@ -320,7 +320,7 @@ class Plant(Injecting):
                 rubbing.rows[0] @ T, lambda rates: rubbing.coefficients(rates[None])[0])
 
     def _injected(self, position: Array, velocity: Array) -> tuple[Array, Array]:
-        """Return injected forces that do not follow velocities, and slopes of those that do."""
+        """Return injected forces that do not depend on velocities, and slopes of the others."""
         force, slope = np.zeros_like(position), np.zeros_like(position)
         for j, name, drawn, nominal in self._pushes:
             only, following = slice(j, j + 1), [(j + 1) % len(position)]

@@ -25,7 +25,7 @@ def aligned(offset: int, size: int) -> int:
 
 
 class Walk:
-    """A place in the bytes of a message, which moves on over what is read.
+    """A reading position in the bytes of a message.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ def for_json(content: Any) -> Any:
     if hasattr(content, 'to_dict'):
         return content.to_dict() if isinstance(content, JsonRecord) else for_json(content.to_dict())
     if is_dataclass(content):
-        return {each.name: for_json(getattr(content, each.name)) for each in fields(content)}
+        return {field.name: for_json(getattr(content, field.name)) for field in fields(content)}
     if isinstance(content, Mapping):
         return {displayed(key): for_json(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):

@@ -105,7 +105,7 @@ def test_it_follows_setpoints_and_holds_when_they_stop(robot: RobotBench) -> Non
 
 @pytest.mark.parametrize(('change', 'words'), [
     ({'position': [float('nan')] * 6}, 'must be finite'),
-    ({'name': ['a', 'b', 'c', 'd', 'e', 'f']}, 'must hold slide_1'),
+    ({'name': ['a', 'b', 'c', 'd', 'e', 'f']}, 'must contain slide_1'),
     ({'velocity': []}, 'velocity has 0 values'),
     ({'position': [9.0] * 6}, 'outside its stroke'),
 ])

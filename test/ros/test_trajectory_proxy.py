@@ -130,7 +130,7 @@ def test_a_goal_reaches_the_controller_with_its_efforts(cell: Cell) -> None:
 def test_a_goal_that_breaks_a_rule_is_refused_when_it_is_asked(cell: Cell) -> None:
     found = MODEL.drive_forces(HelicalPath().motion([1.0, 1.1])).drive_motion
     for joint, stamp, moving, far, code, said in (
-            ('a', 0, False, 0.0, 'NAMES', 'must hold each'),
+            ('a', 0, False, 0.0, 'NAMES', 'must contain each'),
             (DRIVES[0], 5, False, 0.0, 'TIME', 'ended'),
             (DRIVES[0], 0, False, 5.0, 'WORKSPACE', ''),
             (DRIVES[0], 0, True, 0.0, 'LIMIT', 'in motion')):

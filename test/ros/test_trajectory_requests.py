@@ -106,7 +106,7 @@ def test_what_is_missing_is_rejected_where_no_spline_is_asked_for() -> None:
 def test_other_joints_are_rejected(names: tuple[str, ...]) -> None:
     wrong = message()
     wrong.joint_names = list(names)
-    with pytest.raises(Rejection, match='must hold each of shoulder, elbow, wrist once'):
+    with pytest.raises(Rejection, match='must contain each of shoulder, elbow, wrist once'):
         READER.of_message(wrong, 7)
 
 

@@ -237,7 +237,7 @@ class AdoptionRunResult(Result):
         return self.run.ended == REFUSED
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the model file, as `AdoptionResult.save`; as it was, with nothing to adopt.
+        """Write the model file; with nothing to adopt it is the input model.
 
         Raises
         ------

@@ -378,7 +378,7 @@ class DiagnosisResult(Result):
 
     @property
     def fitted(self) -> DriveModel:
-        """The model with what is missing, not checked as `adopt` does."""
+        """The model with the reported effects, without the checks of `adopt`."""
         return self.diagnosis.adopted
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:

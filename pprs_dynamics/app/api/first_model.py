@@ -211,7 +211,7 @@ def first_model(
     branch, notes = _branch(description, tool, recorded)
     notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
-    shared = [name for each in coupled(description) for name in each.joints if name in chosen]
+    shared = [name for gear in coupled(description) for name in gear.joints if name in chosen]
     if shared and not drives:
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
@@ -268,22 +268,22 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
         except PprsError as error:
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
             return notes + draft.questions
-        readings = [each for each in mistakes if isinstance(each, OtherReading)]
-        sure = [each for each in readings if each.scales and each.kind in SURE_KINDS
-                and corrected.isdisjoint((each.kind, drive) for drive, _, _ in each.scales)]
+        readings = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
+        sure = [reading for reading in readings if reading.scales and reading.kind in SURE_KINDS
+                and corrected.isdisjoint((reading.kind, drive) for drive, _, _ in reading.scales)]
         if not sure:
             # What a line can say of efforts that are no measurement is a question as well.
             draft.questions += [
-                each.what + ''.join(f': if so, write {line}' for line in lines_of([each]))
-                for each in mistakes if isinstance(each, OtherReading) or lines_of([each])]
-            if not any(each.kind.startswith(('effort', 'drive_constant')) for each in readings):
+                mistake.what + ''.join(f': if so, write {line}' for line in lines_of([mistake]))
+                for mistake in mistakes if isinstance(mistake, OtherReading) or lines_of([mistake])]
+            if not any(seen.kind.startswith(('effort', 'drive_constant')) for seen in readings):
                 draft.questions += _questions_of_names(draft)
             return notes + draft.questions
-        for each in sure:
-            corrected |= {(each.kind, drive) for drive, _, _ in each.scales}
-            draft.guessed.append(each.what)
-            notes.append(each.what)
-            for drive, key, value in each.scales:
+        for reading in sure:
+            corrected |= {(reading.kind, drive) for drive, _, _ in reading.scales}
+            draft.guessed.append(reading.what)
+            notes.append(reading.what)
+            for drive, key, value in reading.scales:
                 (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
@@ -321,7 +321,7 @@ def _description(path: Path, is_mjcf: bool) -> Description:
 
 def _branch(description: Description, tool: str, recorded: Collection[str],
             ) -> tuple[Branch, list[str]]:
-    """Return what is between base and tool, and what was not clear about it."""
+    """Return the chain from base to tool, and notes on ambiguities."""
     if tool:
         if tool not in description.links:
             raise UnknownNameError('link', tool, description.links, '--tool')
@@ -360,7 +360,7 @@ def _moves_nothing(description: Description, name: str) -> bool:
     joint = description.joints[name]
     below = [joint.child]
     for link in below:
-        below += [each.child for each in description.joints.values() if each.parent == link]
+        below += [child.child for child in description.joints.values() if child.parent == link]
     mass, *_, xx, xy, yy, xz, yz, zz = description.links[joint.child]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     found = mass if joint.kind == PRISMATIC else joint.axis @ inertia @ joint.axis
@@ -414,7 +414,7 @@ def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
 
 
 def _names(contents: Contents, joints: Sequence[str]) -> dict[str, str]:
-    """Return how joints of messages, or of columns of our own form, are those of a description.
+    """Return the recorded name of each joint of a description.
 
     Names may differ in how words are divided, and in what stands before them in either.
     """
@@ -456,7 +456,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> dict[str, str]:
 
 
 def _is_short_for(first: str, other: str) -> bool:
-    """Return whether the words of one name begin with those of another, as j1 of joint_1."""
+    """Return whether one name abbreviates another, as j1 does joint_1."""
     first, other = (''.join(word for word in words_of(name) if not word.isdigit())
                     for name in (first, other))
     return first.startswith(other) or other.startswith(first)
@@ -465,7 +465,7 @@ def _is_short_for(first: str, other: str) -> bool:
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Mapping[str, str],
              movable: Sequence[str], model: DriveModel, rate: float | None,
              ) -> tuple[dict[str, Any], list[str], set[str]]:
-    """Return what `columns` hold, what was guessed, and which quantities there are."""
+    """Return the content of `columns`, comments on guesses, and the recorded quantities."""
     kinds, drives = {*files}, model.drives
     found: dict[str, Any] = {}
     if files:
@@ -490,7 +490,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
     if guess.time is not None:
         if guess.time not in TIME_COLUMNS:
             found['time'] = guess.time
-    elif not all(str(each.column).startswith('/') for each in contents.series):  # not of a bag
+    elif not all(str(series.column).startswith('/') for series in contents.series):  # not of a bag
         if guess.rate is None:
             raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
                                   'samples per second')
@@ -520,10 +520,10 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
                for kind, file in inside.items() if kind != FILE_TIME}
     merged = replace(
         guesses[POSITION], rate=rate,
-        columns={key: column for each in guesses.values() for key, column in each.columns.items()},
-        scales={key: scale for each in guesses.values() for key, scale in each.scales.items()},
-        notes=[f'{files[kind].name}: {note}' for kind, each in guesses.items()
-               for note in each.notes])
+        columns={key: name for guess in guesses.values() for key, name in guess.columns.items()},
+        scales={key: scale for guess in guesses.values() for key, scale in guess.scales.items()},
+        notes=[f'{files[kind].name}: {note}' for kind, guess in guesses.items()
+               for note in guess.notes])
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
         return replace(merged, time=series[0].column if series else 1)

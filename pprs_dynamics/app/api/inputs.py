@@ -39,7 +39,7 @@ OTHER = 'what is held out must be another recording'
 
 
 def stage(progress: Progress | None, what: str) -> Callable[[float], None]:
-    """Return what is to be called with the share of a stage that is done."""
+    """Return the progress callback of one stage."""
     return lambda share: progress(what, share) if progress else None
 
 
@@ -289,7 +289,7 @@ def _read(model: DriveModel, path: File, topic: str | None, progress: Progress |
 
 def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Progress | None,
               ) -> dict[str, Recording]:
-    """Return recordings by path or name; of those from memory two may have the same."""
+    """Return recordings by path or name; two from memory may have the same name."""
     found: dict[str, Recording] = {}
     for entry in listed_recordings(given):
         recording = entry if isinstance(entry, Recording) else _read(model, entry, topic, progress)
@@ -300,7 +300,7 @@ def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Prog
 
 
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
-    """Return what is given as one or several, as several."""
+    """Return one or several recordings as a list."""
     return [given] if isinstance(given, (str, PathLike, Recording)) else given
 
 

@@ -119,7 +119,7 @@ class ExperimentResult(Result):
         return sorted(self.design.limits.items(), key=lambda item: -item[1])
 
     def view(self) -> Any:
-        """Return what a motion is for, what it promises, and which limits it uses."""
+        """Return purpose, expected evidence and used limits of a motion, for the terminal."""
         parts: list[Any] = [f'[bold]{escape(self.design.text)}[/]']
         if self.design.contests:
             parts.append(titled_table('Evidence, now and expected', self._contests, right=()))

@@ -48,7 +48,7 @@ Number = TypeVar('Number', int, float)
 
 
 class UsageError(PprsError, ValueError):
-    """Arguments that do not go together, or that what was read does not have."""
+    """Arguments that contradict each other or the files."""
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
@@ -193,7 +193,7 @@ def check_files(options: argparse.Namespace) -> None:
 
 
 def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -> Inputs:
-    """Read model and recordings of the arguments, and print what is wrong with the latter.
+    """Return model and recordings of the arguments; print faults of the recordings.
 
     Excerpts of what is too long for a fit, but where the `whole` is asked for.
 
@@ -210,8 +210,9 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
                            options.topic, progress, whole, getattr(options, 'as_it_is', False))
     for recording in (*inputs.fitted, *inputs.held_out):
         # That velocities are computed is no fault; `pprs info` says so.
-        for finding in (each for each in recording.findings if each.kind != 'missing_velocity'):
-            screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
+        for finding in recording.findings:
+            if finding.kind != 'missing_velocity':
+                screen.print(f'[yellow]![/] {shown(f"{recording.name}: {finding.text}")}')
     return inputs
 
 

@@ -172,7 +172,7 @@ def describe_mechanism(model: DriveModel) -> MechanismJson:
 
 
 def mechanism_lines(model: DriveModel) -> list[str]:
-    """Return the same as sentences for the terminal."""
+    """Return bodies, joints, loops and home as sentences for the terminal."""
     s = model.robot.structure
     held = f': {", ".join(s.held)} held' if s.held else ''
     lines = [

@@ -74,7 +74,7 @@ def _complete() -> None:
 
 @contextmanager
 def _cleaned_up() -> Iterator[None]:
-    """End on SIGTERM as on an error, so that what is half-written is taken away."""
+    """End on SIGTERM as on an error, so that incomplete files are removed."""
     if threading.current_thread() is not threading.main_thread():  # which alone gets signals
         yield
         return
@@ -141,7 +141,7 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Parser whose errors are one line, without the usage, and name what was meant."""
+    """Parser whose errors are one line without the usage, with the likely correct name."""
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""

@@ -136,7 +136,7 @@ def add_contributions(page: Page, residuals: Residuals, forces: dict[str, Any], 
 
 def effect_pictures(diagnosis: Diagnosis, found: FoundEffect, remaining: Array,
                     ) -> list[tuple[Any, str]]:
-    """Return what one effect has to explain and what it makes of it, with captions.
+    """Return pictures of an effect: the error without it and its force, with captions.
 
     The first is over the variable that the effect depends on; the last is over time. `remaining` is
     the residual of the row of the effect, (M, D) [N].
@@ -213,7 +213,7 @@ def _largest_span(residuals: Residuals, force: Array) -> slice:
 
 
 def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
-    """Return the shape of what remains along what it depends on."""
+    """Return a picture of the unexplained error over its variable."""
     noise = diagnosis.noise.get(statement.drive)
     return None if noise is None else along(
         with_error(diagnosis.residuals, diagnosis.remaining), noise, statement, 'what remains')

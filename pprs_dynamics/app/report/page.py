@@ -71,16 +71,16 @@ class Page:
         self._body.append(f'<h2>{escape(text)}</h2>')
 
     def fold(self, title: str, is_open: bool = False) -> AbstractContextManager[None]:
-        """Put what is added within the block behind a title that opens it."""
+        """Put the content of the block behind a title that opens it."""
         return self._around(f'<details{" open" * is_open}><summary>{escape(title)}</summary>',
                             '</details>')
 
     def columns(self) -> AbstractContextManager[None]:
-        """Put what is added within the block side by side, where the screen is wide enough."""
+        """Put the content of the block side by side on wide screens."""
         return self._around('<div class="columns">', '</div>')
 
     def block(self) -> AbstractContextManager[None]:
-        """Keep what is added within the block together, in one column."""
+        """Put the content of the block into one column."""
         return self._around('<div>', '</div>')
 
     @contextmanager
@@ -235,7 +235,7 @@ class Page:
 
 
 def _data(name: str, content: str) -> str:
-    """Return JSON for scripts; within it an end tag would end it, wherever it stands."""
+    """Return JSON for a script element, with end tags escaped."""
     safe = content.replace('<', '\\u003c')
     return f'<script type="application/json" id="{name}">{safe}</script>'
 

@@ -77,7 +77,7 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
 
 
 def quantities(data: Residuals) -> list[str]:
-    """Return the names of what may be drawn."""
+    """Return the names of the quantities that can be plotted."""
     return ['time', *(name for name in data.variables), *EFFORTS]
 
 

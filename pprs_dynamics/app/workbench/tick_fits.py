@@ -184,7 +184,7 @@ class TickFits:
                      self.residual(more).astype(np.float32))
 
     def with_chosen(self, tick: Tick) -> EffectCandidate:
-        """Return a tick's candidate in the shapes that somebody chose."""
+        """Return a tick's candidate with the chosen shapes."""
         placements = []
         for component in tick.best.components:
             shape = {name: tick.chosen.get((component.drive, name), value)
@@ -199,7 +199,7 @@ class TickFits:
         return self.fits.at_noise_of(near, tuple(candidates))
 
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
-        """Return a set with the linear parameters that somebody chose; all else follows."""
+        """Return a set with the chosen linear parameters; the others are refitted."""
         blocks: list[Block] = []
         values: list[float] = []
         by_effect = {tick.effect: tick for tick in ticks}

@@ -312,7 +312,7 @@ class Ticks:
         return self._move(revision, self._done, self._undone, 'nothing was done that can be undone')
 
     def forward(self, revision: int | None = None) -> ViewState:
-        """Redo what was undone last; errors as `back`."""
+        """Redo the last undone change; errors as `back`."""
         return self._move(revision, self._undone, self._done, 'nothing was undone')
 
     def _move(self, revision: int | None, source: list[Moment], target: list[Moment], none: str,

@@ -128,7 +128,7 @@ class ViewState:
 
 
 def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision: int) -> ViewState:
-    """Return what is shown of ticks at the noise of the state before, in milliseconds."""
+    """Return the view of ticks at the noise of the previous state; takes milliseconds."""
     free = fits.at([tick.best for tick in ticks.values()], last.free)
     found = _with_chosen(fits, free, ticks)
     stds = {name: {key: estimate.std for key, estimate in last.estimates[name].items()}

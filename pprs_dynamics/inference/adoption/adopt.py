@@ -216,7 +216,7 @@ class _Case:
         before, with_it = residuals
         errors = [rms(before), rms(with_it)]
         if self.validate:
-            held_out = [rms(each) for each in self.residuals(self.validate, self.model, after)]
+            held_out = [rms(found) for found in self.residuals(self.validate, self.model, after)]
         if after is not self.model:
             objections += (
                 self.objections(predictive_gain(before, with_it), errors, 'the recordings',
@@ -354,11 +354,11 @@ def requested_model(answer: Answer, effects: Sequence[FoundEffect],
     """
     base, placed = parts_of(answer.fits, answer.fitted)
     known = {effect.name: effect.parameters for effect in effects}
-    model = model_at(answer.design, base, [each for each in placed if each.effect.name in known])
+    model = model_at(answer.design, base, [part for part in placed if part.effect.name in known])
     given = answer.design.given.values.get('effects.active') or ()
-    known = {**{each.name: estimate_present(answer.fits, answer.fitted, each)
-                for each in model.effects if each.name in given
-                and isinstance(each, (DriveEffect, StructureEffect))}, **known}
+    known = {**{effect.name: estimate_present(answer.fits, answer.fitted, effect)
+                for effect in model.effects if effect.name in given
+                and isinstance(effect, (DriveEffect, StructureEffect))}, **known}
     values = dict(model.values)
     for name, parameters in known.items():
         values.update({
@@ -388,7 +388,7 @@ def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
             continue
         inner = {name.rpartition('.')[0] for name in component.names if effect.is_of_one_place}
         place = (f'{design.drives[component.drive]}.' if component.drive is not None
-                 else ''.join(f'{each}.' for each in inner))
+                 else ''.join(f'{link}.' for link in inner))
         less = DriveModel.from_parameters(
             without_effect(answer.adopted.values, effect.name, [place]))
         less_force = design.exact_forces(answer.adopted) - design.exact_forces(less)
@@ -432,7 +432,7 @@ def _with_curve(case: _Case, request: EffectRequest) -> Adoption:
     fitted = fit_curve(start, request)
     after = with_curve(bare, drive, fitted)
     if case.validate:
-        given, found = (measure_residuals(each, case.validate)[0] for each in (bare, after))
+        given, found = (measure_residuals(tried, case.validate)[0] for tried in (bare, after))
     else:
         held_out = np.zeros_like(start.model)
         held_out[:, model.drives.index(drive)] = fitted.held_out

@@ -154,7 +154,7 @@ class Answer:
 
     @cached_property
     def effects(self) -> tuple[FoundEffect, ...]:
-        """Effects of the row; those whose force removes most of the error first."""
+        """Effects of the row, largest error reduction first."""
         return tuple(self.found(candidate) for candidate in sorted(
             Row(self.fits, self.fitted).effects,
             key=lambda candidate: -self.over_noise(self.remaining + self.force(candidate))))

@@ -64,7 +64,7 @@ class Localisation:
 
 def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
              ) -> Localisation:
-    """Return where the error of each drive lies, as far as noise would not do the same.
+    """Return the patterns of the error of each drive that noise does not explain.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class LiveEffect(JsonRecord):
     confirmed: bool = False
 
     def is_same(self, other: LiveEffect) -> bool:
-        """Return whether two windows mean the same: one of both's names, on the same drives."""
+        """Return whether two windows report the same effect, or its rival, on the same drives."""
         return ((self.found.name in other.names or other.found.name in self.names)
                 and self.found.drives == other.found.drives)
 

@@ -68,7 +68,7 @@ def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Return a number with as many digits, never as a power of ten; 0 below what is resolved."""
+    """Return a number with so many digits, never as a power of ten; 0 below `RESOLVED`."""
     if not isfinite(value) or abs(value) < RESOLVED:
         return f'{value:g}' if not isfinite(value) else '0'
     text = f'{value:.{_decimals(value, digits)}f}'

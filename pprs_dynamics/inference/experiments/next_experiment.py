@@ -51,7 +51,7 @@ RESERVE = 4.0  # standard deviations of noise that efforts are kept below their 
 
 
 class PurposeError(PprsError, ValueError):
-    """A purpose that needs what is not given."""
+    """A purpose whose recordings are missing."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ class Experiment(JsonRecord):
 
 
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
-    """Return pairs in words, those of the same first effect together."""
+    """Return pairs in words, grouped by their first effect."""
     others: dict[str, list[str]] = {}
     for name, other in pairs:
         others.setdefault(name, []).append(other)

@@ -370,7 +370,7 @@ class Question:
         return self.information.of_motion(self.information.on_motion(moved, time), series.duration)
 
     def worth(self, gram: Array) -> float:
-        """Return the value of a motion in addition to what is known."""
+        """Return the value of a motion in addition to the recordings."""
         total = self.known + gram
         return (separation(self.contests, total) if self.contests
                 else self.precision.value(total))

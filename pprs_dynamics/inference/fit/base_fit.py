@@ -110,7 +110,7 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
         folds = [(_fitted(model, [*parts[:k], *parts[k + 1:]])[0], [part])
                  for k, part in enumerate(parts)]
     report(0.9)
-    before, after = (measure_residuals(each, recordings)[0] for each in (model, fitted))
+    before, after = (measure_residuals(tried, recordings)[0] for tried in (model, fitted))
     return BaseFit(fitted, numbers, (*notes, PART_OF_IT), rms_by_drive(before),
                    rms_by_drive(after), _errors(folds), on,
                    explained_shares(after), little_explained(fitted, after))

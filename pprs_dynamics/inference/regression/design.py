@@ -340,7 +340,7 @@ class Design:
     @classmethod
     def planned(cls, sensitivities: Sensitivities, forces: Forces, time: Array,
                 block: int = 1) -> Design:
-        """Return the design of a motion that nobody has made yet.
+        """Return the design of a planned motion, without measurements.
 
         All widths of reversal are open, since a drive that stood in a recording may move here.
 

@@ -248,7 +248,7 @@ class Sensitivities:
         return self._own[1]
 
     def _at(self, model: Any, state: Any) -> Any:
-        """Return the same motion with the bodies and the reversals of another model."""
+        """Return a motion with the bodies and the reversals of another model."""
         found = replace(state.with_load(model.robot), load=None, reversal=model.reversal)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):

@@ -54,7 +54,7 @@ class Compared(NamedTuple):
 
 
 class LiveComparison:
-    """Takes joint states one by one, and gives model and residual for those it can judge.
+    """Compares joint states with the model one by one: model effort and residual.
 
     Answers lag by half the smoothing window: acceleration needs samples from both sides. They
     are computed many at a time, which costs hardly more than one. A window has at least `FEWEST`
@@ -153,7 +153,7 @@ class LiveComparison:
         return Compared(time, model, residual)
 
     def _begin_again(self, time: float) -> None:
-        """Start afresh after a gap, in the same machine unless time went back."""
+        """Reset after a gap; the memory of effects is reset if time went back."""
         start = self._state.start
         self._state = self._model.initial_state(
             start if start is not None and start <= time else None)

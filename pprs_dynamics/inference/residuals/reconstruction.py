@@ -281,7 +281,7 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
             found += effect.position_error(names, position)
         return found
 
-    q, v, a = (each[:, chosen] for each in (read.position, read.velocity, read.acceleration))
+    q, v, a = (values[:, chosen] for values in (read.position, read.velocity, read.acceleration))
     functions = [effect for effect in effects if effect.is_of_position]
     before, at, after = (errors(functions, q + step) for step in (-POSITION_STEP, 0.0,
                                                                   POSITION_STEP))

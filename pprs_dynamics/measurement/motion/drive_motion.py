@@ -170,7 +170,7 @@ def _held_poses(recording: Recording) -> DriveMotion:
 
 def smoothed_again(motion: DriveMotion, recording: Recording,
                    made: Callable[[Array], Array]) -> DriveMotion:
-    """Return a motion with the window that suits what is made of its positions.
+    """Return a motion smoothed over the window that suits its positions.
 
     Bursts of an encoder that is not where its drive is shorten the window that suits what it
     reads, and lengthen it where they look like noise.

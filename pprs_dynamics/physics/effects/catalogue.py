@@ -72,8 +72,8 @@ def _guarded(effect: type[CatalogueEffect], method: Callable[..., Any]) -> Calla
 
 def _place(effect: type[CatalogueEffect], error: BaseException) -> str:
     """Return where in the effect's own files an exception came from, for the end of a sentence."""
-    files = {getattr(sys.modules.get(each.__module__), '__file__', None)
-             for each in effect.__mro__ if each.__module__.split('.')[0] != 'pprs_dynamics'}
+    files = {getattr(sys.modules.get(parent.__module__), '__file__', None)
+             for parent in effect.__mro__ if parent.__module__.split('.')[0] != 'pprs_dynamics'}
     lines = [f' ({frame.f_code.co_filename}, line {line})'
              for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename in files]
     return lines[-1] if lines else ''

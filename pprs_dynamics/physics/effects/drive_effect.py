@@ -237,7 +237,7 @@ class DriveEffect(CatalogueEffect):
             drive: before.get(drive, memory) for drive, memory in fresh.items()}
 
     def check_memory(self, memories: Mapping[str, Any]) -> None:
-        """Raise ModelError where memories, by effect, are not those of these drives."""
+        """Raise ModelError if memories, by effect, do not fit these drives."""
         super().check_memory(memories)
         memory = memories[self.name]
         if memory is not None and set(memory) != set(self.drives):

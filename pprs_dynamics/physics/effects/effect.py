@@ -350,7 +350,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 cls.coefficients = (
                     *(p.product.coefficient if p.product else p
                       for name, p in linear.items() if name not in in_waves),
-                    *(each for wave in cls.waves for each in wave.coefficients(linear)))
+                    *(c for wave in cls.waves for c in wave.coefficients(linear)))
             if 'variants' not in vars(cls):
                 cls.variants = (tuple(c.name for c in cls.coefficients),)
             if 'scanned' not in vars(cls):

@@ -61,7 +61,7 @@ def alike_bodies(robot: Mechanism) -> tuple[tuple[int, ...], ...]:
 @lru_cache(KEPT)
 def _alike_bodies(structure: Structure, bodies: tuple[int, ...],
                   gravity: tuple[float, float, float]) -> tuple[tuple[int, ...], ...]:
-    """Return the same; how heavy the bodies are does not matter."""
+    """Return groups of bodies by number, for any masses."""
     count = len(bodies)
     if count < 2:
         return tuple((k,) for k in range(count))

@@ -46,7 +46,7 @@ def root_of(description: Description) -> str:
 
 
 def branch_to(description: Description, tool: str) -> Branch:
-    """Return what is between the base and a link."""
+    """Return the chain between the base and a link."""
     hung = {joint.child: joint for joint in description.joints.values()}
     joints: list[Joint] = []
     link = tool

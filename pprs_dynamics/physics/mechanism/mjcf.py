@@ -165,7 +165,7 @@ class _Reader:
                                  f'gravcomp="{value:g}" off')
 
     def _remarks(self) -> Iterator[str]:
-        """Yield sentences on what is not used."""
+        """Yield sentences on elements that are not used."""
         balls = [self.names[k] for k in range(self.model.njnt) if self.model.jnt_limited[k]
                  and self.model.jnt_type[k] == self.mujoco.mjtJoint.mjJNT_BALL]
         if balls:

@@ -181,7 +181,7 @@ class Closing:
                                  'is half a turn off at home')
 
     def mobility(self, q: Array, drives: Integers, moves: Array) -> Mobility:
-        """Return what is free at a closed home.
+        """Return degrees of freedom and independent constraints at a closed home.
 
         Parameters
         ----------

@@ -182,7 +182,7 @@ def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -
 
 def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
             transmissions: tuple[Transmission, ...]) -> Iterator[str]:
-    """Yield sentences on what is in the file and not in the model."""
+    """Yield sentences on elements of the file that the model does not use."""
     carried = {joint.child for joint in joints.values()}
     hollow = [link.get('name', '') for link in robot.findall('link')
               if link.get('name') in carried and link.find('inertial') is None

@@ -479,7 +479,7 @@ class DriveModel:
 
     def without(self, effect: str) -> Self:
         """Return the model without the effect of that name."""
-        return replace(self, effects=tuple(each for each in self.effects if each.name != effect))
+        return replace(self, effects=tuple(kept for kept in self.effects if kept.name != effect))
 
     def measured(self, forces: Forces, state: ModelState | None = None) -> Forces:
         """Return the measured forces where the drives apply `forces`.

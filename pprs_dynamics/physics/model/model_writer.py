@@ -238,7 +238,7 @@ def _effects_block(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT))
 
 def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
            prefix: str = '') -> list[str]:
-    """Return flat keys as nested lines, each followed by what it is."""
+    """Return flat keys as nested lines, each with its comment."""
     found: list[str] = []
     done = set()
     for key in values:

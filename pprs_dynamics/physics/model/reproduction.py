@@ -34,7 +34,7 @@ HARD_REVERSAL = 1e-9
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the paper against what comes out.
+    """A statement of the paper, and the result of this model.
 
     Parameters
     ----------

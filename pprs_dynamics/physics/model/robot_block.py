@@ -168,20 +168,20 @@ def _require_motors(description: Description, values: Mapping[str, Any]) -> None
     """Raise ModelError where joints share a transmission, and the file does not say how."""
     drives = set(values[DRIVES_KEY])
     mapped = {joint for turns in blocks_below(values, MOTORS).values() for joint in turns}
-    for each in coupled(description):
-        shared = [name for name in each.joints if name in drives]
+    for gear in coupled(description):
+        shared = [name for name in gear.joints if name in drives]
         if set(shared) - mapped:
             turns = ', '.join(f'{name}: 1.0' for name in shared)
             raise ModelError(
-                DRIVES_KEY, list(each.joints), 'have a motor each, but share a transmission '
-                f'{each.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
+                DRIVES_KEY, list(gear.joints), 'have a motor each, but share a transmission '
+                f'{gear.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
                 '}}, turns of each motor per turn of its joints')
 
 
 def coupled(description: Description) -> list[Transmission]:
     """Return the transmissions of a description whose motors do not move one joint each."""
-    return [each for each in description.transmissions
-            if any(word in each.kind.lower() for word in COUPLED)]
+    return [transmission for transmission in description.transmissions
+            if any(word in transmission.kind.lower() for word in COUPLED)]
 
 
 def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,7 +229,7 @@ def described_gravity(structure: Structure) -> tuple[float, ...]:
     root = next(link for link in description.links if link not in hung)
     _, frame = structure.links[root]
     turned = frame.R @ np.array(description.gravity or STANDARD_GRAVITY)
-    return tuple(float(each) for each in turned)
+    return tuple(float(component) for component in turned)
 
 
 def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:

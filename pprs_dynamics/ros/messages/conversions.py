@@ -107,7 +107,7 @@ def joint_state(
     stamp: int, effort: Array | None = None, position: Array | None = None,
     velocity: Array | None = None, names: RobotNames = PAPER,
 ) -> JointState:
-    """Return what is known of the joints at a time [ns]."""
+    """Return a JointState message for a time [ns]."""
     message = JointState(name=list(names.joints))
     for field, values in (('position', position), ('velocity', velocity), ('effort', effort)):
         if values is not None:
@@ -155,9 +155,9 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False,
     names, values = list(message.name), getattr(message, field)
     missing = [drive for drive in drives if drive not in names]
     if missing:
-        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
+        raise Rejection('NAMES', f'name is {names!r:.100}, must contain {missing[0]}')
     if twice := [drive for drive in drives if names.count(drive) > 1]:
-        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {twice[0]} once')
+        raise Rejection('NAMES', f'name is {names!r:.100}, must contain {twice[0]} once')
     if len(values) != len(names):
         raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
                         f'{len(names)}, as name')

@@ -31,7 +31,7 @@ class MeasuredState(NamedTuple):
 
 
 class MeasuredStates:
-    """Reads joint states, and merges those that hold some of the drives each by their stamps.
+    """Reads joint states, and merges messages of different drives by their stamps.
 
     A message with all drives is one sample. Of others, as of several broadcasters, samples
     are at the stamps of the first drive, as `pprs` reads recordings. Messages with no drive at
@@ -125,7 +125,7 @@ class MeasuredStates:
         position, effort = np.zeros((2, len(due), len(self._joints)))
         for k, samples in enumerate(self._streams.values()):
             times, *values = zip(*samples, strict=True)
-            position[:, k], effort[:, k] = (at_stamps(due, times, each) for each in values)
+            position[:, k], effort[:, k] = (at_stamps(due, times, series) for series in values)
             older = sum(time < due[-1] for time in times)
             del samples[:max(older - STEPS, 0)]
         return [MeasuredState(int(due[row]), position[row], effort[row])
@@ -133,5 +133,5 @@ class MeasuredStates:
 
 
 def _missing(message: JointState, joint: str) -> Rejection:
-    return Rejection('NAMES', f'name is {list(message.name)!r:.100}, must hold {joint}, or another '
-                     f'message within {PATIENCE:g} s')
+    return Rejection('NAMES', f'name is {list(message.name)!r:.100}, must contain {joint}, or '
+                     f'another message within {PATIENCE:g} s')

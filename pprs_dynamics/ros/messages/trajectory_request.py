@@ -280,7 +280,7 @@ class RequestReader:
 
     def _check_names(self, names: list[str], frame: str) -> None:
         if sorted(names) != sorted(self._names):
-            raise Rejection('NAMES', f'joint_names is {names!r:.200}, must hold each of '
+            raise Rejection('NAMES', f'joint_names is {names!r:.200}, must contain each of '
                             f'{", ".join(self._names)} once, and nothing else')
         if self._frame is not None and frame not in ('', self._frame):
             raise Rejection('FRAME', f'header.frame_id is {frame!r:.100}, '
@@ -322,7 +322,7 @@ class RequestReader:
                 *_twist(point.velocities), *_twist(point.accelerations)]
 
     def _fill_in(self, numbers: Array, time: Array, lacking: Mask) -> None:
-        """Put the derivatives of a spline into the columns of those points that lack their own."""
+        """Put the derivatives of a spline into the points without derivatives."""
         place, velocity, acceleration = self._parts(numbers)
         derivatives = spline_derivatives(time, place, self._is_body)
         for given, values, rows in zip((velocity, acceleration), derivatives, lacking.T,

@@ -54,7 +54,7 @@ class SentPoints(NamedTuple):
 
 
 class ControllerWatch:
-    """Compares the reference of a controller with what was sent to it.
+    """Compares the reference of a controller with the trajectories that were sent to it.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class ControllerWatch:
         return bool(np.isfinite(self._heard))
 
     def sent(self, position: Array, left: float, moves_at_end: bool) -> None:
-        """Take note of a trajectory that goes out; see `SentPoints`."""
+        """Store a published trajectory; see `SentPoints`."""
         now = self._clock()
         if not self._sent or now - self._sent[-1].time > LOOKED_BACK:
             self._first_sent, self._strays_since = now, None
@@ -157,22 +157,22 @@ class ControllerWatch:
         return 'the controller does not follow: ' + next(self._reasons(missing))
 
     def _strays(self, reference: Array) -> bool:
-        """Return whether a reference is nowhere near what was sent of late, or stands meanwhile."""
+        """Return whether a reference is far from the latest trajectories, or at rest meanwhile."""
         if not self._sent:
             return False
-        sent = np.concatenate([each.position for each in self._sent])
+        sent = np.concatenate([setpoint.position for setpoint in self._sent])
         way = np.ptp(sent, axis=0)
         if way.max() < LEAST_WAY:
             return False
         moving = way >= MOVES * way.max()
         off = np.abs(sent - reference)[:, moving] / way[moving]
-        gone = np.ptp([each for _, each in self._went], axis=0)
+        gone = np.ptp([position for _, position in self._went], axis=0)
         full = self._went[-1][0] - self._went[0][0] > PATIENCE
         stands = full and (gone[moving] < STANDS * way[moving]).all()
         return bool(stands or off.max(axis=1).min() > NEAR)
 
     def _reasons(self, missing: Sequence[str]) -> Iterator[str]:
-        """Yield what may be the reason, likeliest first."""
+        """Yield possible reasons, likeliest first."""
         more = [name for name in self._names if name not in self._joints]
         if missing:
             yield f'it has no joint {missing[0]}'
@@ -181,7 +181,7 @@ class ControllerWatch:
                    'allow_partial_joints_goal: true')
         if not self._has_efforts:
             yield 'it has no command interface `effort`, and drops trajectories with efforts'
-        left = float(np.median([each.left for each in self._sent]))
+        left = float(np.median([setpoint.left for setpoint in self._sent]))
         if left < SHORT_END:
             when = (f'end {1e3 * left:.0f} ms after' if left > 0
                     else f'ended {-1e3 * left:.0f} ms before')

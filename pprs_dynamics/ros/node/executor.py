@@ -82,8 +82,8 @@ class PromptExecutor(StoppableExecutor):
         rest_due, wait_set = 0.0, WaitSet(self.context)
         while not self._stopped.done() and self.context.ok():
             nodes = self.get_nodes()
-            subscriptions = [each for node in nodes for each in node.subscriptions]
-            timers = [each for node in nodes for each in node.timers]
+            subscriptions = [subscription for node in nodes for subscription in node.subscriptions]
+            timers = [timer for node in nodes for timer in node.timers]
             others = self._wait(wait_set, nodes, subscriptions, timers)
             for subscription in wait_set.ready('subscription', subscriptions):
                 self._take(subscription)
@@ -99,9 +99,9 @@ class PromptExecutor(StoppableExecutor):
         timers: list[Timer],
     ) -> bool:
         """Wait for anything, and return whether it is neither a message nor a timer."""
-        guards = [each for node in nodes for each in node.guards]
-        clients = [each for node in nodes for each in node.clients]
-        services = [each for node in nodes for each in node.services]
+        guards = [guard for node in nodes for guard in node.guards]
+        clients = [client for node in nodes for client in node.clients]
+        services = [service for node in nodes for service in node.services]
         wait_set.wait(subscriptions, timers, [self._waker, *guards], clients, services)
         if not self.context.ok():
             raise ExternalShutdownException

@@ -141,7 +141,7 @@ class GoalRelay:
         return bool(await self._first(look, Future()))
 
     def cancel(self, handle: Any) -> None:
-        """Cancel what was sent on for a goal, if anything was."""
+        """Cancel the goal that was sent on for a goal, if any."""
         watched = self._running.get(bytes(handle.goal_id.uuid))
         if watched is not None:
             watched.cancel()

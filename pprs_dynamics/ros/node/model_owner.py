@@ -66,7 +66,7 @@ class OwnerStatus(NamedTuple):
         """
         content = json.loads(text)
         model = content['model']
-        return cls(str(content['robot']), tuple(Path(each['file']).name for each in model['files']),
+        return cls(str(content['robot']), tuple(Path(file['file']).name for file in model['files']),
                    str(model['sha256']), int(content['changes']))
 
 

@@ -104,8 +104,8 @@ class ModelHistory:
         """
         if not self._is_restoring:
             self._before = [*self._before, [
-                Parameter(each.name, value=before[each.name])
-                for each in changed if each.name in before]][-MOST_CHANGES:]
+                Parameter(parameter.name, value=before[parameter.name])
+                for parameter in changed if parameter.name in before]][-MOST_CHANGES:]
 
     def _restore(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if not self._before:
@@ -183,8 +183,8 @@ class ModelParameters:
     def _validated(self, changes: Iterable[Parameter]) -> tuple[DriveModel, dict[str, Any]]:
         self._refuse_foreign(changes)
         values = current_values(self._node, changes)
-        node_values = {each.name: each.check(values.pop(each.name, None))
-                       for each in self._declared}
+        node_values = {parameter.name: parameter.check(values.pop(parameter.name, None))
+                       for parameter in self._declared}
         model = DriveModel.from_parameters(values)
         now = self._staying(model, node_values)
         for name, before in self._stays.items():
@@ -199,7 +199,7 @@ class ModelParameters:
         names = {DRIVES_KEY: model.drives,
                  'joint_prefix and joint_map': model.recorded.joints}
         return {**{name: ', '.join(value) for name, value in names.items()},
-                **{each.name: node_values[each.name] for each in self._declared if each.stays}}
+                **{own.name: node_values[own.name] for own in self._declared if own.stays}}
 
     def _refuse_foreign(self, changes: Iterable[Parameter]) -> None:
         """Refuse new values for other nodes, which a model file may hold: nothing would come of it.
@@ -208,7 +208,7 @@ class ModelParameters:
         ------
         ModelError
         """
-        names, before = {each.name for each in self._declared}, current_values(self._node)
+        names, before = {parameter.name for parameter in self._declared}, current_values(self._node)
         for change in changes:
             value = current_values(self._node, [change]).get(change.name)
             if change.name in OF_OTHERS - names and before.get(change.name) != value:

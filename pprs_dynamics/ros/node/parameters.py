@@ -127,9 +127,9 @@ def declare_node_parameters(node: Node, parameters: Sequence[NodeParameter]) -> 
         For a value that breaks its rule.
     """
     given = overrides(node)
-    values = {each.name: each.check(given.get(each.name, each.default)) for each in parameters}
-    for each in parameters:
-        _declare(node, each, values[each.name])
+    values = {own.name: own.check(given.get(own.name, own.default)) for own in parameters}
+    for parameter in parameters:
+        _declare(node, parameter, values[parameter.name])
     return values
 
 
@@ -219,12 +219,12 @@ def refuse_unknown(node: Node) -> None:
 
 
 def overrides(node: Node) -> dict[str, Any]:
-    """Return what was given in files and on the command line, None for an empty list."""
+    """Return parameters of files and command line; None for an empty list."""
     return {name: plain_value(value) for name, value in parameter_overrides(node).items()}
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
-    """Return all declared parameters with some of them changed, flat; those not set left out."""
+    """Return all declared and set parameters, with some of them changed."""
     merged = {**node.get_parameters_by_prefix(''), **{change.name: change for change in changes}}
     return {name: plain_value(parameter.value) for name, parameter in merged.items()
             if parameter.type_ != Parameter.Type.NOT_SET}

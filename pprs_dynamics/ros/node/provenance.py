@@ -60,7 +60,7 @@ def _paths(arguments: Sequence[str]) -> list[Path]:
 
 
 def arguments_of(options: Mapping[str, Any]) -> Sequence[str]:
-    """Return the command line of a node with such options: its own, or that of the process."""
+    """Return the command line of a node: its own options, or those of the process."""
     return options.get('cli_args') or sys.argv
 
 

@@ -84,7 +84,7 @@ class WaitSet:
 
 
 def take(subscription: Subscription) -> tuple[Any, Any] | None:
-    """Return the next message, or its bytes, and what is known of its way; None where none is."""
+    """Return the next message, or its bytes, with its transport information; None without one."""
     try:
         with subscription.handle:
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)

@@ -228,7 +228,7 @@ class Body:
 
 @dataclass(frozen=True)
 class ExportedRobot:
-    """A robot as it stands in a file.
+    """A robot in the format of a file.
 
     Parameters
     ----------

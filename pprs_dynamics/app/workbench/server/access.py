@@ -153,7 +153,7 @@ class AccessControl:
 
 
 class TooLongError(Exception):
-    """A body that goes on after what it said, or said nothing."""
+    """A body that is longer than announced, or whose length is not announced."""
 
 
 def _bounded(receive: Any, most: int) -> Any:

@@ -216,13 +216,13 @@ class Api:
         self.hub, self.keys = hub, keys
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
-        """Return what is asked for by GET, with a query."""
+        """Return the functions that answer GET requests, by path."""
         return {'model.yaml': self.model, 'experiment.csv': self.experiment_file,
                 'live/machine': self.live_machine, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
     def changes(self) -> dict[str, Callable[[Fields], Response]]:
-        """Return what is asked for by POST, with a JSON object."""
+        """Return the functions that answer POST requests, by path."""
         return {'live/set': self.live_set, 'live/restore': self.live_restore,
                 'live/take': self.live_take, **{work.__name__: work for work in (
                     self.tick, self.shares, self.open, self.invite)},
@@ -295,7 +295,7 @@ class Api:
         return self._download('next.csv', 'text/csv', found.save)
 
     def model(self, query: Any) -> Response:
-        """Answer the model file, with what is ticked where that is asked for."""
+        """Answer the model file, with the ticked effects on request."""
         session, with_ticked = self.hub.the_session, query.get('ticked') == '1'
         return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
                               lambda path: session.export(path, with_ticked))
@@ -326,7 +326,7 @@ class Api:
                        'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 
     def files(self, query: Any) -> Response:
-        """Answer what may be opened."""
+        """Answer the names of the files that can be opened."""
         return JSONResponse({'files': [*self.hub.offered.files()]})
 
     def open(self, body: Fields) -> Response:
@@ -362,7 +362,7 @@ class Api:
         return JSONResponse(self._live.restore(body.text('confirmed')))
 
     def live_machine(self, query: Any) -> Response:
-        """Answer what would be set, for a person to confirm."""
+        """Answer the changes that need confirmation."""
         return JSONResponse({'machine': self._live.machine()})
 
     def live_take(self, body: Fields) -> Response:

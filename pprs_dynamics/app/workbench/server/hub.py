@@ -150,7 +150,7 @@ class Hub:
 
     @contextmanager
     def upload(self, name: str) -> Iterator[Path]:
-        """Give the path for an upload, in a folder of its own, with what is plain of its name.
+        """Yield the path of an upload, in its own folder and with a safe name.
 
         After an error inside the block nothing remains, and the upload does not count.
 
@@ -191,7 +191,7 @@ class Hub:
         self._notify()
 
     def _run(self) -> None:
-        """Settle after every change; look for what is missing once nothing happens."""
+        """Refine the fits after every change, and diagnose when the user is idle."""
         with self._opening:  # what a browser opens meanwhile comes on top
             is_unjudged = bool(self.inputs.recordings) and self._done(
                 lambda: self._use(Session.of(self.inputs)))
