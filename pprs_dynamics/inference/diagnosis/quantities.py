@@ -137,8 +137,7 @@ def word_little(little: Mapping[str, float], after: str = '') -> str:
     said = [f'{_of_effort(share)} of the effort of {name}' if not place else
             f'{_of_effort(share)} of that of {name}'
             for place, (name, share) in enumerate(list(little.items())[:MOST_LITTLE])]
-    more = len(little) - MOST_LITTLE
-    if more > 0:
+    if (more := len(little) - MOST_LITTLE) > 0:
         said.append(f'less than half of that of {more} more')
     return f'the model{after} explains {listed(said)}'
 

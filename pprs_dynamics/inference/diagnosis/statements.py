@@ -212,13 +212,14 @@ def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> st
         word = word.replace('velocity', 'speed')
         values, low = np.abs(values), max(low, 0.0)
     below, above = high < values.max(), low > values.min() and not (speed and low <= 0)
-    if below and (not above or (word.startswith('speed') and low <= 0)):
-        return f'at a {word} below {plain(high * factor, SHOWN)} {unit}'
+    word = f'an {word}' if word.startswith('a') else f'a {word}'
+    if below and (not above or (word.startswith('a speed') and low <= 0)):
+        return f'at {word} below {plain(high * factor, SHOWN)} {unit}'
     if above and not below:
-        return f'at a {word} above {plain(low * factor, SHOWN)} {unit}'
+        return f'at {word} above {plain(low * factor, SHOWN)} {unit}'
     digits = next((n for n in range(SHOWN, 6)
                    if plain(low * factor, n) != plain(high * factor, n)), SHOWN)
-    return (f'at a {word} between {plain(low * factor, digits)} and '
+    return (f'at {word} between {plain(low * factor, digits)} and '
             f'{plain(high * factor, digits)} {unit}')
 
 
@@ -250,13 +251,9 @@ def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str
 
 def place_on(group: Sequence[Statement]) -> str:
     """Return on which drives and depending on what a pattern lies."""
-    drives = list(dict.fromkeys(statement.drive for statement in group))
-    return f'on {listed(drives)}, {place_of(group[0].variable)}'
-
-
-def place_of(variable: str) -> str:
-    """Return the variable of an error as a clause: depending on velocity."""
-    return 'at one frequency' if variable == 'frequency' else f'depending on {in_words(variable)}'
+    drives, variable = dict.fromkeys(statement.drive for statement in group), group[0].variable
+    where = 'at one frequency' if variable == 'frequency' else f'depending on {in_words(variable)}'
+    return f'on {listed([*drives])} ({where})'
 
 
 def pattern_over(variable: str, count: int = 1) -> str:

@@ -29,32 +29,32 @@ class Decisions:
     # Prior odds that one more effect is missing, or a width of reversal another. Models are
     # seldom wrong in many ways at once; the smaller, the fewer false claims.
     effect_odds: float = 0.1
-    # Prior odds of friction, mass or stiffness with the wrong sign. Physically impossible as
-    # such, but a model may have too much of it.
+    # Prior odds of friction, mass or stiffness with the wrong sign. Physically impossible, but a
+    # model may have too much of it.
     wrong_sign_odds: float = 0.01
     # Prior odds that a drive's zero is not as stated. Zeros are set when a machine is put up, and
     # lost with a count or a screw.
     zero_odds: float = 0.1
-    # Prior odds that a drive's gain is not as stated. Makers calibrate gains; a free one takes on
-    # inertia and friction that forms leave over.
+    # Prior odds that a drive's gain is not as stated. Makers calibrate gains; a free gain absorbs
+    # the form errors of inertia and friction.
     gain_odds: float = 0.01
     # Prior odds of a form that is in no catalogue, against one that is. A free curve imitates
     # effects; it has to be much better to be believed.
     unknown_odds: float = 0.01
     # Prior odds that an effect begins, ends or grows within the recordings. Odds of 150 to 1
-    # against it beside those of one more effect: many times and kinds of change are tried.
+    # against it in addition to `effect_odds`: many times and kinds of change are tried.
     onset_odds: float = 0.0007
-    # Share of the force of an idealised effect that its lack of fit may leave. Forms of friction
-    # and springs in the literature differ by 5 to 15 %.
+    # Form error of an idealised effect as a share of its force. Forms of friction and springs in
+    # the literature differ by 5 to 15 %.
     form_share: float = 0.15
-    # The same for the input model's own friction, beside a further candidate. Load-dependent
-    # friction is computed from frictionless loads, 1 to 2 % off.
+    # Form error of the input model's friction as a share of its force. Load-dependent friction is
+    # computed from frictionless loads, 1 to 2 % off.
     own_form_share: float = 0.015
     # Share that 99 of 100 form errors do not exceed. Of four shapes (`form_error.SHAPES`), by chi
     # squared, it is 1.82 times the root of the mean square.
     most_form_share: float = 0.273
-    # Error that a drive may keep over its noise, beside what forms of effects leave. What stands
-    # out of the noise to the eye must be reported.
+    # Residual of a drive over its noise, above which the verdict is unknown unless form errors
+    # explain it. A reader sees a residual of 1.5 times the noise in a plot.
     left_ratio: float = 1.5
     # Residual of a drive over its noise, above which the verdict is unknown. No form of an effect
     # is off by so much.
@@ -76,8 +76,8 @@ class Decisions:
     # Share of a drive's effort, below which that a model explains little comes first. Most of
     # what the drive does is then not in the model, whatever noise is like.
     explained: float = 0.5
-    # Share of the noise beside all columns that they leave free, for it to be reported. Else most
-    # of it is extrapolated from frequencies where there is less.
+    # Share of the noise power in the degrees of freedom that no column takes, from which a noise
+    # level is reported. Below it most of the noise is extrapolated from other frequencies.
     noise_seen: float = 0.5
     # Error over a drive's effort, below which compare looks for no places. No drive is known, nor
     # needed, to a thousandth.
@@ -85,8 +85,8 @@ class Decisions:
     # Relative error of the noise, within which compare calls all of an error noise. A spectrum of
     # a dozen coefficients per octave is known to about that.
     noise_accuracy: float = 0.1
-    # Unexplained error over the effort, up to which a model is good. Feedforward then leaves a
-    # twentieth to the controller.
+    # Unexplained error over the effort, up to which a model is good. The controller then has to
+    # supply a twentieth of the effort.
     good: float = 0.05
     # Unexplained error over the effort, above which a model is poor. A fifth is more than
     # friction in most robots.
@@ -109,8 +109,8 @@ class Decisions:
     # Share of the motion in one direction, above which a warning is given. Friction is then a
     # constant but for a twentieth.
     one_way: float = 0.95
-    # Fast part of an effort over that of white noise, below which it looks filtered. Any
-    # amplifier and converter leaves more.
+    # Fast part of an effort over that of white noise, below which it looks filtered. Amplifiers
+    # and converters add more fast noise.
     filtered: float = 0.05
     # Correlation, in two runs, of what repeats of the error of a reference, as expected before
     # its parts show it. Between six pairs of runs of a UR10e it is 0.4 to 0.8.
@@ -120,8 +120,8 @@ class Decisions:
     # The most that it is where a single run is the reference. A machine is not the same on two
     # days: 14 % of what repeats is another.
     one_run_repeats: float = 0.99
-    # Share of the variance of what repeats, from which a state counts as covered by a reference.
-    # It says more of the force there than is left open.
+    # Share of the variance of the repeatable error that a reference explains in a state, from
+    # which the state counts as covered. More of the force is then known than unknown.
     reference_known: float = 0.5
 
 
