@@ -102,7 +102,7 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
     plain = model.drive_forces(motion)
     state = plain.mechanism
     at = motion
-    if changed.misreadings:
+    if changed.position_effects:
         # Positions are read with the error, so that the model is evaluated at another pose.
         q = (state.position + changed.position_error(state.position)
              + changed.loaded_position_error(state.transmitted))
@@ -110,7 +110,7 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
         at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
     forces = changed.drive_forces(at)
     added = changed.measured(forces).total - plain.total
-    if changed.misreadings:
+    if changed.position_effects:
         added = -added
     drive = int(np.argmax((added ** 2).sum(axis=0)))
     return ({'time': motion.time, 'position': state.position[:, drive],
@@ -127,14 +127,14 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
         changed = DriveModel.from_parameters(
             {**model.values, **block(effect, 'swing')}, model.source)
     plain, at = model.drive_forces(motion), motion
-    if changed.misreadings:  # as in `platform_law`
+    if changed.position_effects:  # as in `platform_law`
         read = (motion.position + changed.position_error(motion.position)
                 + changed.loaded_position_error(plain.mechanism.transmitted))
         rate = np.gradient(read, motion.time, axis=0)
         at = replace(motion, position=read, velocity=rate,
                      acceleration=np.gradient(rate, motion.time, axis=0))
     added = changed.drive_forces(at).total - plain.total
-    if changed.misreadings:
+    if changed.position_effects:
         added = -added
     # At the ends differences look to one side only.
     added, inner = added[2:-2], slice(2, -2)

@@ -334,9 +334,9 @@ class FeedforwardNode(ManagedNode):
             return
         self._watchdog.stop()
         self.get_logger().info(f'ends: {self._do_timeout_action()}')
-        for each in (self._commands, self._joint_command, self._joint_trajectory, self._current):
-            if each is not None:
-                each.wait_for_all_acked(ACKNOWLEDGE_TIME)
+        for topic in (self._commands, self._joint_command, self._joint_trajectory, self._current):
+            if topic is not None:
+                topic.wait_for_all_acked(ACKNOWLEDGE_TIME)
 
     def _do_timeout_action(self) -> str:
         """Send what the action says on every topic, once, and return it in words.

@@ -40,7 +40,7 @@ def draw_temperatures(rng: np.random.Generator, time: Array, velocity: Array) ->
     """
     mean, wave, period, phase = (float(rng.uniform(*limits)) for limits in (
         HALL, WAVE, PERIOD, (0, 2 * np.pi)))
-    rise, cooling = (rng.uniform(*each, velocity.shape[1]) for each in (RISE, COOLING))
+    rise, cooling = (rng.uniform(*bounds, velocity.shape[1]) for bounds in (RISE, COOLING))
     speed = np.abs(velocity)
     work = speed / np.maximum(speed.mean(axis=0), 1e-12)
     hall = mean + wave * np.sin(2 * np.pi * time / period + phase)

@@ -287,9 +287,9 @@ class Design:
 
     def reconstructed(self, model: DriveModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings by a model's encoders."""
-        if model.misreadings == self.model.misreadings:
+        if model.position_effects == self.model.position_effects:
             return self.reconstructions
-        key = tuple((misreading.name, repr(misreading.drives)) for misreading in model.misreadings)
+        key = tuple((effect.name, repr(effect.drives)) for effect in model.position_effects)
         if key not in self._moved:
             self._moved.clear()
             self._moved[key] = tuple(read_by(reconstruction, model)

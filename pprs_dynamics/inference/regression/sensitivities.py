@@ -197,7 +197,7 @@ class Sensitivities:
                     columns[BY_FRICTION] = samples.treated(self._under_friction(friction, state))
         if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
-                replace(slow, sensors=[]).interpolated, self._of_misreadings(slow.nodes))
+                replace(slow, sensors=[]).interpolated, self._of_shifted_positions(slow.nodes))
         there = {effect.name for effect in self.given.effects}
         present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
                    if isinstance(effect, StructureEffect) and effect.name in there}
@@ -223,7 +223,7 @@ class Sensitivities:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
         return self.model.friction.dry(state.friction_load)
 
-    def _of_misreadings(self, state: Any) -> tuple[list[Array], list[Array]]:
+    def _of_shifted_positions(self, state: Any) -> tuple[list[Array], list[Array]]:
         """Return the changes per position, and per acceleration, that are measured too much.
 
         Of each drive, (N, D) each.

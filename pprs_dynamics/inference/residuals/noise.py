@@ -124,8 +124,8 @@ class NoiseShapes:
             found = np.where(is_better, white + grown * of_constant, found)
             weight = counts / spectrum ** 2
             sloped = weight * slow
-            a, b, c = (each.sum(axis=-1) for each in (weight, sloped, sloped * slow))
-            x, y = ((each * seen).sum(axis=-1) for each in (weight, sloped))
+            a, b, c = (rows.sum(axis=-1) for rows in (weight, sloped, sloped * slow))
+            x, y = ((rows * seen).sum(axis=-1) for rows in (weight, sloped))
             white = np.maximum((c * x - b * y) / np.maximum(a * c - b ** 2, 1e-9 * a * c), least)
             grown = np.maximum((y - b * white) / c, least)
             white = np.maximum((x - b * grown) / a, least)

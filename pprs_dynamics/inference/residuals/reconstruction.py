@@ -300,12 +300,12 @@ def _followed_rightly(
     windup: Array | None, progress: Progress | None = None,
 ) -> tuple[DriveMotion, Motion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
-    if not model.misreadings:
+    if not model.position_effects:
         return read, motion_of_drives(model, time, read, progress)
-    q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
+    q, q_dot, q_ddot = misread(model.position_effects, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
-    if np.any(q_dot) and not all(misreading.is_of_position for misreading in model.misreadings):
+    if np.any(q_dot) and not all(effect.is_of_position for effect in model.position_effects):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
     followed = motion_of_drives(model, time, drives, progress)

@@ -102,7 +102,7 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
                     for d in candidate.drives or ()}
         effects = (*filter(_is_new, reported.effects), *(candidate for _, candidate in alone))
         for fitted in _of_one_cause(fits, best, (
-                each for each in effects if not changing.isdisjoint(each.drives or changing))):
+                other for other in effects if not changing.isdisjoint(other.drives or changing))):
             fits.pruned(fits.evaluate(_refined(fits, fitted).candidates))
     return bool(drives)
 

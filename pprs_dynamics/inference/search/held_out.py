@@ -111,8 +111,8 @@ def sample_gains(before: Residuals, after: Residuals) -> tuple[Array, Array]:
     """
     # One of them may show that some efforts are of motion before their segment.
     known = np.isfinite(before.measured) & np.isfinite(after.measured)
-    before, after = (replace(each, measured=np.where(known, each.measured, np.nan))
-                     for each in (before, after))
+    before, after = (replace(error, measured=np.where(known, error.measured, np.nan))
+                     for error in (before, after))
     gains, sizes = np.zeros(before.error.shape), np.zeros(before.error.shape)
     counts = np.isfinite(before.measured).sum(axis=0)
     if counts.max() < LEAST_SAMPLES:
@@ -182,7 +182,7 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
     left_out = fitted.nuisance_blocks if only is None else [
-        block for block in fit.blocks if block not in [fitted.blocks[each] for each in only]]
+        block for block in fit.blocks if block not in [fitted.blocks[key] for key in only]]
     plain[:, fit.index_of(left_out)] = 0.0
     left = np.full(regression.residuals.measured.shape, np.nan)
     squares, count = 0.0, 0

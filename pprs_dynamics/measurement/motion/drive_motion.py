@@ -221,8 +221,8 @@ def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array
         if not np.any(values):
             parts.append([np.zeros((kept.stop - kept.start, *values.shape[1:]))] * 3)
             continue
-        filter_, ends = (each.polynomial(grid.step)
-                         for each in (smoothing or motion.smoothing, motion.smoothing))
+        filter_, ends = (window.polynomial(grid.step)
+                         for window in (smoothing or motion.smoothing, motion.smoothing))
         reached = grid.inside(filter_.half)
         inside = slice(max(kept.start, reached.start), min(kept.stop, reached.stop))
         if inside == kept:

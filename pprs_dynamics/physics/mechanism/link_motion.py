@@ -194,7 +194,7 @@ class LinkMotion:
             turned: Array = np.einsum('nbji,nbj...->nbi...', R, values)
             return turned
 
-        W, U = (own(each[:, rows]) for each in self.link_jacobians)
+        W, U = (own(jacobian[:, rows]) for jacobian in self.link_jacobians)
         w, wd = own(m.w[:, rows])[..., None], own(m.wd[:, rows])[..., None]
         a = own(m.ud[:, rows] - gravity)[..., None]
 
@@ -243,7 +243,7 @@ class ToolPose:
         row, frame = structure.links[structure.tool]
         q = home[None, t.drives]
         at_home = LinkMotion.of(structure, q, np.zeros_like(q), np.zeros_like(q))
-        m, (W, U) = at_home.motion, (each[0, row] for each in at_home.link_jacobians)
+        m, (W, U) = at_home.motion, (jacobian[0, row] for jacobian in at_home.link_jacobians)
         self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
         linear, angular = U + np.cross(W, m.R[0, row] @ frame.p, axis=0), W
         self.chosen = _independent(np.vstack((linear / structure.size,
@@ -300,7 +300,7 @@ class ToolPose:
         if len(motion):
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
-            each[:, self._drives].copy() for each in (found.q, found.v, found.a))
+            rows[:, self._drives].copy() for rows in (found.q, found.v, found.a))
         return (JointMotion(position, velocity, acceleration, motion.time,
                             channels=motion.channels),
                 found.q[:, self._own])

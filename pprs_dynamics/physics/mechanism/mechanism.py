@@ -137,7 +137,7 @@ class Mechanism:
         found = []
         for k, name in enumerate(self.body_names):
             if k != self.carrier and self.masses[k] > 0:
-                x, y, z = (round(each, 6) for each in self.centre_of(name).tolist())
+                x, y, z = (round(value, 6) for value in self.centre_of(name).tolist())
                 found.append(BodyPlace(name, (x, y, z), float(self.masses[k]), links=(name,)))
         return tuple(found)
 
@@ -153,7 +153,7 @@ class Mechanism:
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        is_own: bool = False) -> JointFriction:
-        """Return friction of joints as `MechanismState.against_friction` takes it.
+        """Return friction of joints as `MechanismState.friction_efforts` takes it.
 
         Parameters
         ----------

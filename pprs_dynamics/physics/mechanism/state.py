@@ -274,7 +274,7 @@ class MechanismState(JointMotion):
         acceleration[:, drive] += change
         return self.robot.perturbed(self, self.position, acceleration)
 
-    def against_friction(self, friction: Any) -> Array:
+    def friction_efforts(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
         efforts: Array = (
             self.inverse_dynamics.efforts[JOINT_EFFORT]

@@ -685,7 +685,7 @@ def _moves(structure: Structure) -> Array:
     """Return the tool's motion and that of all centres of mass per rate of each coordinate."""
     t, size, home = structure.tables, structure.size, structure.home
     _, _, m = constraint_jacobian(t, home, np.arange(len(home)))
-    W, U = (each[0] for each in link_jacobians(t, m, np.eye(len(home))[None]))
+    W, U = (jacobian[0] for jacobian in link_jacobians(t, m, np.eye(len(home))[None]))
     row, frame = structure.links[structure.tool]
     moves = [(U[row] + np.cross(W[row], m.R[0, row] @ frame.p, axis=0)) / size, W[row]]
     for body, parameters in enumerate(structure.inertial):

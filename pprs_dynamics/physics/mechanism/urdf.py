@@ -125,10 +125,10 @@ def _described(content: bytes, path: str) -> Description:
         transmissions = tuple(map(_transmission, robot.findall('transmission')))
     except ValueError as error:
         raise UnreadableFileError(path, str(error)) from None
-    for each in transmissions:
-        for name in each.joints if each.reduction else ():
+    for gear in transmissions:
+        for name in gear.joints if gear.reduction else ():
             if name in joints and joints[name].kind in TURNING:
-                joints[name] = replace(joints[name], reduction=each.reduction)
+                joints[name] = replace(joints[name], reduction=gear.reduction)
     if (loop := robot.find('constraint')) is not None:
         raise UnreadableFileError(path, f'holds <constraint name="{loop.get("name", "")}">, which '
                                   'no URDF has: write it under robot.loops of the model file')
@@ -169,7 +169,7 @@ def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -
             continue
         mass, _, moments, _ = principal_inertia(parameters)
         low, middle, high = np.sort(moments)
-        listed = ', '.join(f'{each:.3g}' for each in (low, middle, high))
+        listed = ', '.join(f'{value:.3g}' for value in (low, middle, high))
         if low < -ROUNDED * high or high > (1 + ROUNDED) * (low + middle) + TINY:
             yield (f'link {name} is no body: its principal moments of inertia are {listed} '
                    'kg m^2, of which none may be negative, nor greater than the sum of the others')
@@ -195,8 +195,8 @@ def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
         yield (f'<dynamics> of {_listed(rubbing)} is not used: friction is what the model file '
                'says, or fit finds')
     used = {name for name, joint in joints.items() if joint.reduction}
-    left = [each.name or each.kind for each in transmissions
-            if not each.joints or not used & set(each.joints)]
+    left = [unused.name or unused.kind for unused in transmissions
+            if not unused.joints or not used & set(unused.joints)]
     if left:
         yield (f'<transmission> {_listed(left)} is not used: only a simple one with a reduction, '
                'of a joint that turns, is; write gear_ratio')

@@ -504,8 +504,8 @@ class DriveModel:
         return Forces(total, parts, mechanism)
 
     @property
-    def misreadings(self) -> tuple[MeasurementEffect, ...]:
-        """Effects because of which drives are elsewhere than their encoders say."""
+    def position_effects(self) -> tuple[MeasurementEffect, ...]:
+        """Measurement effects that shift the measured positions of drives."""
         return tuple(effect for effect in self.effects
                      if isinstance(effect, MeasurementEffect) and effect.shifts_positions())
 
@@ -518,18 +518,18 @@ class DriveModel:
 
     def position_error(self, position: Array) -> Array:
         """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
-        errors = [e.position_error(self.drives, position) for e in self.misreadings]
+        errors = [e.position_error(self.drives, position) for e in self.position_effects]
         return np.sum(errors, axis=0) if errors else np.zeros_like(position)
 
     def loaded_position_error(self, transmitted: Array) -> Array:
         """Return the errors of measured positions by what gears pass on, (N, D)."""
-        errors = [e.loaded_position_error(self.drives, transmitted) for e in self.misreadings]
+        errors = [e.loaded_position_error(self.drives, transmitted) for e in self.position_effects]
         return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
         """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
         errors: Array = np.sum([e.windup_error(self.drives, transmitted, windup)
-                                for e in self.misreadings], axis=0)
+                                for e in self.position_effects], axis=0)
         return errors
 
 

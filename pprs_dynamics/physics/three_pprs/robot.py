@@ -427,7 +427,7 @@ class ThreePprs(Alike):
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        is_own: bool = False) -> Joints:
-        """Return friction of joints as `MechanismState.against_friction` takes it.
+        """Return friction of joints as `MechanismState.friction_efforts` takes it.
 
         Only the model's own may be printed.
         """

@@ -350,7 +350,7 @@ class RequestReader:
             if points.names != self._names:
                 order = [points.names.index(joint) for joint in self._names]
                 position, velocity, acceleration = (
-                    each[:, order] for each in (position, velocity, acceleration))
+                    rows[:, order] for rows in (position, velocity, acceleration))
             motion = JointMotion.checked(position, velocity, acceleration, offsets / NANOSECONDS,
                                          len(self._names))
         return TrajectoryRequest(motion, points.stamp or now, offsets)

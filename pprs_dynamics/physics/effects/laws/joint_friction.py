@@ -97,7 +97,7 @@ class JointFrictionEffect(PassiveJointEffect):
             joint, _, name = key.rpartition('.')
             if value:
                 blocks.setdefault(joint, {'radius': radii[joint]})[name] = value
-        return state.against_friction(state.robot.friction_table(blocks, state.reversal))
+        return state.friction_efforts(state.robot.friction_table(blocks, state.reversal))
 
 
 class ModelJointFriction(Effect):
@@ -117,7 +117,7 @@ class ModelJointFriction(Effect):
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        return state.against_friction(self.table(state.robot, state.reversal))
+        return state.friction_efforts(self.table(state.robot, state.reversal))
 
     def table(self, robot: Any, reversal: Reversal) -> Any:
         """Return its friction as states of a robot take it, once for each way to turn over."""
