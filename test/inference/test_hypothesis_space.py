@@ -215,7 +215,7 @@ def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prior_costs() -> N
         c for c in everything() if c.name == 'drive_1' and c.drives == (0, 2))
     for candidates in ((), (structure,), (structure, on_drives)):
         found = fits.evaluate(candidates)
-        terms = found.terms.to_dict()
+        terms = vars(found.terms)
         assert sum(terms.values()) == pytest.approx(found.total) == found.cost
         assert terms['fit'] + terms['coefficients'] == pytest.approx(found.fit.deviance)
         # Seven names at odds of 1 : 10; two of three drives, as one of three kinds of choice.

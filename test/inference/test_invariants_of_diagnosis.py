@@ -121,7 +121,7 @@ def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -
     assert [each for each, _ in found.sets[0].names] == [
         candidate.name for candidate in table.best.fitted.candidates]
     for fitted in found.sets:
-        assert sum(fitted.terms.to_dict().values()) == pytest.approx(fitted.cost, abs=1e-6)
+        assert sum(vars(fitted.terms).values()) == pytest.approx(fitted.cost, abs=1e-6)
     for effect in found.effects:
         without = min(row.cost for row in table.rows
                       if effect.name not in {candidate.name for candidate in row.effects})
