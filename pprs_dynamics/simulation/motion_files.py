@@ -97,12 +97,12 @@ def _columns(path: object, header: list[str]) -> tuple[str, ...]:
     missing = [name for name in POSE_COLUMNS if name not in header]
     if missing:
         raise UnreadableFileError(
-            path, f'not a file of poses: the header must hold {",".join(POSE_COLUMNS)}, '
+            path, f'not a file of poses: the header must contain {",".join(POSE_COLUMNS)}, '
             f'but {missing[0]} is missing')
     unknown = [name for name in header if name not in POSE_COLUMNS + TWIST_COLUMNS]
     if unknown or len(set(header)) < len(header):
         name = unknown[0] if unknown else max(header, key=header.count)
-        raise UnreadableFileError(path, f'the column {name!r} is unknown or stands twice')
+        raise UnreadableFileError(path, f'the column {name!r} is unknown or occurs twice')
     twists = [name for name in TWIST_COLUMNS if name in header]
     if twists and len(twists) < len(TWIST_COLUMNS):
         raise UnreadableFileError(

@@ -31,7 +31,7 @@ ENDS = 'must end in '
 MISTAKES = {
     'adopt coulomb_frictoin run.csv --output x.yaml': 'did you mean coulomb_friction',
     'adopt coulomb_friction:lift_7 run.csv --output x.yaml': "unknown drive 'lift_7'",
-    'adopt payload_mass:lift_1 run.csv --output x.yaml': 'must stand alone',
+    'adopt payload_mass:lift_1 run.csv --output x.yaml': 'must be requested without',
     'adopt payload_mass run.csv --model model.yaml --output model.yaml':
         '--output and the model at once',
     'adopt payload_mass run.csv --output none/x.yaml': 'its folder does not exist',

@@ -52,7 +52,7 @@ def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder:
     with workbench('--model', AXIS, short, folder=folder) as bench:
         bench.enter()
         screen = bench.wait(lambda screen: not screen['is_beginning'])
-        assert 'must hold at least 100 of a drive' in screen['failure']
+        assert 'must contain at least 100 of a drive' in screen['failure']
         assert 'Error' not in (folder / 'workbench.log').read_text()
 
 

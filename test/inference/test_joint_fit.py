@@ -147,7 +147,7 @@ def test_too_short_a_recording_is_a_sentence() -> None:
     short = np.zeros((40, 1))
     residuals = Residuals(('a',), PERIOD * np.arange(40), np.zeros(40, dtype=int), short, short,
                           {}, {}, PERIOD)
-    with pytest.raises(ResidualsError, match=r'at most 40 samples .* must hold at least 100'):
+    with pytest.raises(ResidualsError, match=r'at most 40 samples .* must contain at least 100'):
         Regression(residuals)
 
 

@@ -201,7 +201,7 @@ def test_a_log_in_json_is_a_table(form: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(read.position, q)
     np.testing.assert_allclose(read.effort, effort)
     path.write_text('{"text": "no table"}')
-    with pytest.raises(UnreadableFileError, match='holds no table'):
+    with pytest.raises(UnreadableFileError, match='contains no table'):
         read_recording(path, first.model.recorded)
 
 

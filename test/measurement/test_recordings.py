@@ -294,16 +294,16 @@ def test_rows_that_belong_to_other_topics_leave_the_motion_as_it_is(tmp_path: Pa
 
 
 MISTAKES = {
-    'no time': (lambda text: text.replace('time', 'zeit', 1), 'must hold time'),
+    'no time': (lambda text: text.replace('time', 'zeit', 1), 'must contain time'),
     'no drive': (lambda text: text.replace('lift_2', 'hub_2'), 'no lift_2/position; .*hub_2'),
     'an underscore': (lambda text: re.sub(r'\n0.01,[^,]*', '\n0.01,1_0', text),
-                      'row 7, column slide_1/position must hold'),
+                      'row 7, column slide_1/position must contain'),
     'a digit of another script': (lambda text: re.sub(r'\n0.01,[^,]*', '\n0.01,\u0663', text),
-                                  'row 7, column slide_1/position must hold'),
+                                  'row 7, column slide_1/position must contain'),
     'a word': (lambda text: text.replace('\n0.01,', '\nsoon,'), "row 7, column time .*'soon'"),
     'a decimal comma': (
         lambda text: text.replace(',', ';').replace('\n0.01;', '\n0,01;'), 'decimal comma'),
-    'a short row': (lambda text: text[:-40], 'row 41 holds 13 cells, but the header 19'),
+    'a short row': (lambda text: text[:-40], 'row 41 contains 13 cells, but the header 19'),
     'a column twice': (lambda text: text.replace('lift_1/velocity', 'lift_1/position'),
                        "2 columns have the name 'lift_1/position'"),
     'no position anywhere': (lambda text: re.sub(r'(?m)^([0-9][^,]*),[^,]*', r'\1,', text),

@@ -353,7 +353,7 @@ def test_a_time_of_day_of_digits_without_end_is_no_date(tmp_path: Path) -> None:
     rows = content.splitlines()
     rows[6] = f'12:{9**30},' + rows[6].partition(',')[2]
     (tmp_path / 'run.csv').write_text('\n'.join(rows))
-    with pytest.raises(UnreadableFileError, match='row 7, column t must hold a number'):
+    with pytest.raises(UnreadableFileError, match='row 7, column t must contain a number'):
         read(tmp_path / 'run.csv', keys)
 
 

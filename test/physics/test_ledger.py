@@ -96,8 +96,8 @@ DAMAGE = {
     'history.step_01.forced': (0.5, 'be true or false'),
     'history.step_01.recordings': ('a.csv', 'be a list'),
     'history.step_01.weather': ('fine', 'unknown key history.step_01.weather'),
-    'history': ('x', 'stand under history.step_01'),
-    'history.first.effect': ('x', 'stand under history.step_01'),
+    'history': ('x', 'be under history.step_01'),
+    'history.first.effect': ('x', 'be under history.step_01'),
     'history.step_04.effect': ('x', 'be there before history.step_04'),
 }
 

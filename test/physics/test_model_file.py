@@ -73,7 +73,7 @@ WRONG = [
     ('effects.active', ['stribeck_friction'], 'be given'),
     ('effects.active', True, 'list of names'),
     ('geometry.rod_length', 0.01, 'greater than 0.05 m, for the platform to stand'),
-    ('limits', 5, 'must be a mapping, of names to what they hold'),
+    ('limits', 5, 'must be a mapping, of names to their content'),
     ('bogus', None, 'unknown key bogus'),
     ('effects.effort_offset.lift_9.force', 1.0, r'unknown drive lift_9 \(known: slide_1, '
      r'slide_2, slide_3, lift_1'),
@@ -140,7 +140,7 @@ def test_numbers_are_those_that_ros_reads(tmp_path: Path, number: str) -> None:
 def test_a_key_given_nested_and_with_dots_is_refused(tmp_path: Path) -> None:
     file = tmp_path / 'model.yaml'
     file.write_text(PAPER.read_text() + '    masses.payload: 3.0\n')
-    with pytest.raises(ModelError, match=r'masses\.payload is 3\.0, must stand once'):
+    with pytest.raises(ModelError, match=r'masses\.payload is 3\.0, must occur once'):
         DriveModel.load(file)
 
 

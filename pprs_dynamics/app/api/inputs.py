@@ -324,7 +324,7 @@ def _require_efforts(recordings: Mapping[str, Recording]) -> None:
             cut_off = [finding.text for finding in recording.findings
                        if finding.kind == 'mostly_saturated']
             raise UnreadableFileError(name, '; '.join(cut_off) or (
-                'no effort of any drive is recorded, must be recorded beside the positions '
+                'no effort of any drive is recorded, must be recorded with the positions '
                 '(<drive>/effort in a CSV, effort in JointState)'))
 
 

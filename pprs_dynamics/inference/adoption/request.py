@@ -77,8 +77,8 @@ class EffectRequest:
             return cls(effect)
         drives = tuple(dict.fromkeys(on))
         if not issubclass(effect, DriveEffect):
-            raise EffectRequestError(f'{name} is in the structure and must stand alone, without '
-                                     f'{", ".join(drives) or "drives"}')
+            raise EffectRequestError(f'{name} is in the structure and must be requested '
+                                     f'without {", ".join(drives) or "drives"}')
         for drive in drives:
             if drive not in known:
                 raise EffectRequestError(f'unknown drive {drive!r}{suggestion(drive, known)}, '

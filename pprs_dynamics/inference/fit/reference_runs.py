@@ -83,7 +83,7 @@ def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
         if fingerprint(file.path) != file.sha256:
             raise UnreadableFileError(
                 file.path, f'it is not what {name} was fitted to (its SHA-256 is another): fit the '
-                'model again, or take it as it is with --reference FILE')
+                'model again, or accept it with --reference FILE')
     return found
 
 

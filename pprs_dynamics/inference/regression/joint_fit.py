@@ -121,7 +121,7 @@ class Regression:
         if not self.drives:
             most = max(map(len, every.values()), default=0)
             raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
-                                 f'hold at least {least} of a drive')
+                                 f'contain at least {least} of a drive')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}

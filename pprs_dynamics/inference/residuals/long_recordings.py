@@ -98,8 +98,8 @@ def _excerpt(recording: Recording, share: float) -> Recording:
     segments = [pieces[group[int(np.argmax(moved[group]))]] for group in groups]
     kept = sum(part.stop - part.start for part in segments)
     finding = Defect(TOO_LONG, used - kept,
-                     f'{used * step:.0f} s at {1 / step:.4g} Hz are more than a search holds in '
-                     f'memory: {len(segments)} stretches of {length * step:.3g} s, spread over '
+                     f'{used * step:.0f} s at {1 / step:.4g} Hz are too many for the memory of '
+                     f'a search: {len(segments)} stretches of {length * step:.3g} s, spread over '
                      'them, are fitted')
     return replace(recording, segments=tuple(segments), findings=(finding, *recording.findings))
 

@@ -236,7 +236,7 @@ def reconstruct(
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
             names, rests.mean(axis=0), strict=True) if share >= 0.005)
-        notes.append('efforts of drives that stand do not count, static friction holds any: '
+        notes.append('efforts of drives at rest do not count, static friction balances any: '
                      + (', '.join(shares) or 'less than 0.5% of the time'))
     drives = replace(drives, notes=tuple(notes))
     gain = np.full(len(names), np.nan) if recording.gain is None else recording.gain

@@ -99,9 +99,9 @@ class Residuals:
                      f'be ({samples},)')
         for name, array in {**table, **self.variables, 'time': self.time}.items():
             _require(name == 'measured' or bool(np.isfinite(array).all()), name,
-                     'it holds a number that is not finite', 'be finite')
+                     'it contains a number that is not finite', 'be finite')
         _require(bool(np.isfinite(self.measured).any()), 'effort', 'none was measured on any drive',
-                 'be recorded beside the positions (<drive>/effort in a CSV, effort in JointState)')
+                 'be recorded with the positions (<drive>/effort in a CSV, effort in JointState)')
         _require(self.period > 0, 'period', f'it is {self.period}', 'be greater than 0 s')
 
     def __len__(self) -> int:

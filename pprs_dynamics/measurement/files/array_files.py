@@ -87,11 +87,11 @@ class ArrayTable:
             return array
         if array.ndim != 2:
             raise UnreadableFileError(self.path, f'column {name!r} has the shape {array.shape}, '
-                                      'must hold numbers, or lists of them')
+                                      'must contain numbers, or lists of them')
         count = array.shape[1]
         if element is None or element >= count:
-            raise UnreadableFileError(self.path, f'column {name!r} holds lists of {count}, must be '
-                                      f'named {name}[0] to {name}[{count - 1}]')
+            raise UnreadableFileError(self.path, f'column {name!r} contains lists of {count}, must '
+                                      f'be named {name}[0] to {name}[{count - 1}]')
         return array[:, element]
 
     def _numbers(self, name: str, values: Any) -> Any:
@@ -100,12 +100,12 @@ class ArrayTable:
         if np.issubdtype(array.dtype, np.datetime64):
             array = array.astype('datetime64[ns]').astype(np.int64)
         if array.dtype.kind == 'c' and np.any(array.imag):
-            raise UnreadableFileError(self.path, f'column {name!r} holds complex numbers, must '
+            raise UnreadableFileError(self.path, f'column {name!r} contains complex numbers, must '
                                       'hold real ones: take its real part')
         try:
             array = array if array.dtype.kind in 'iu' else array.real.astype(float)
         except (TypeError, ValueError):
-            raise UnreadableFileError(self.path, f'column {name!r} holds something else than '
+            raise UnreadableFileError(self.path, f'column {name!r} contains something else than '
                                       'numbers') from None
         array = np.squeeze(array) if array.size > 1 else array.ravel()
         return array.T if array.ndim == 2 and array.shape[0] < array.shape[1] else array
@@ -172,7 +172,7 @@ def _lerobot(path: Path) -> ArrayTable:
         features = json.loads((path / INFO).read_text(encoding='utf-8'))['features']
         labels = {name: _labels(of.get('names')) for name, of in features.items()}
     except (OSError, ValueError, KeyError, AttributeError, TypeError):
-        raise UnreadableFileError(path, f'{INFO} holds no features of a LeRobot dataset'
+        raise UnreadableFileError(path, f'{INFO} contains no features of a LeRobot dataset'
                                   ) from None
     files = sorted((path / 'data').rglob('*.parquet'))
     if not files:
@@ -265,8 +265,8 @@ def _json(path: Path) -> dict[str, Any]:
         content = [json.loads(line) for line in text.splitlines() if line.strip()]
     table = _largest_table(content, DEEPEST)
     if not table:
-        raise UnreadableFileError(path, 'it holds no table: a list of objects, or lists of numbers '
-                                  'of one length')
+        raise UnreadableFileError(path, 'it contains no table: a list of objects, or lists of '
+                                  'numbers of one length')
     return table
 
 

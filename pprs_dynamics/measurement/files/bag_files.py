@@ -97,7 +97,7 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
         if progress is not None:
             progress(done, max(total, done))
     if not done:
-        raise UnreadableFileError(bag.path, f'{name} holds no messages')
+        raise UnreadableFileError(bag.path, f'{name} contains no messages')
     if not blocks.samples:
         if blocks.twice:
             raise UnreadableFileError(
@@ -264,11 +264,11 @@ def _tell_missing(
     missing = [drive for drive in drives if drive not in blocks.names]
     if missing:
         raise UnreadableFileError(
-            path, f'{topic} lacks {", ".join(missing[:MOST])}; it holds '
+            path, f'{topic} lacks {", ".join(missing[:MOST])}; it contains '
             + (', '.join(sorted(blocks.names)[:MOST]) or 'no names')
             + f'; {missing_names(drives, blocks.names, path.name[:40])}')
     raise UnreadableFileError(
-        path, f'no single message on {topic} holds positions of all of {", ".join(drives)}')
+        path, f'no single message on {topic} contains positions of all of {", ".join(drives)}')
 
 
 def _ignored(
@@ -278,7 +278,7 @@ def _ignored(
     others = sorted(blocks.names - set(drives))
     if others:
         findings.append(Defect('ignored_joints', len(others),
-                               f'{topic} also holds {", ".join(others)}'))
+                               f'{topic} also contains {", ".join(others)}'))
     skipped = messages - blocks.samples
     if skipped:
         findings.append(Defect(

@@ -209,7 +209,7 @@ def _storages_of(path: Path) -> tuple[list[Path], list[Defect]]:
     if not found:
         raise UnreadableFileError(path, f'not a rosbag2 directory: there is no {METADATA}')
     if len(kinds) > 1:
-        raise UnreadableFileError(path, 'it holds files of ROS 1 and ROS 2: name one of them')
+        raise UnreadableFileError(path, 'it contains files of ROS 1 and ROS 2: name one of them')
     if kinds == {True}:
         return found, []  # ROS 1 has no metadata
     return found, [Defect('no_metadata', len(found), f'the bag has no {METADATA}')]

@@ -243,7 +243,7 @@ class CsvTable:
         if len(cells) == self.count:
             return cells
         raise UnreadableFileError(
-            self.path, f'row {number} holds {counted(len(cells), "cell")}, but the '
+            self.path, f'row {number} contains {counted(len(cells), "cell")}, but the '
             f'{"header" if self.names else "first"} {self.count}: it is truncated or not a table')
 
     def _number(self, line: int, cells: Sequence[str], column: int, is_date: bool) -> float:
@@ -256,8 +256,8 @@ class CsvTable:
             comma = (' (a decimal comma: write columns: {decimal: ","} in the model file)'
                      if re.fullmatch(r'[-+\d]+,\d+', cell) else '')
             raise UnreadableFileError(
-                self.path, f'row {line}, column {self.title(column)} must hold a number, but '
-                f'holds {cell[:40]!r}{comma}') from None
+                self.path, f'row {line}, column {self.title(column)} must contain a number, but '
+                f'contains {cell[:40]!r}{comma}') from None
 
 
 def cells_of(path: Path, number: int, line: str, separator: str) -> list[str]:

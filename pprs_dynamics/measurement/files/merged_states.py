@@ -95,7 +95,7 @@ def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
                           and name[len(known):][:1] in ('.', '[')), None)
             if topic is None:
                 raise UnreadableFileError(
-                    bag.path, f'no topic of the column {name}; it holds '
+                    bag.path, f'no topic of the column {name}; it contains '
                     + ', '.join(sorted(topics)[:MOST]))
             way = name[len(topic):]
             found.append(Field(topic, f'data{way}' if way.startswith('[') else way[1:], joint,
@@ -164,7 +164,7 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
     kept = np.isfinite([columns.get((drive, 'position'), none) for drive in drives]).all(axis=0)
     topics = ', '.join(sorted({connection.topic for connection in connections}))
     if not np.any(kept):
-        raise UnreadableFileError(bag.path, f'{topics} holds no positions of all of '
+        raise UnreadableFileError(bag.path, f'{topics} contains no positions of all of '
                                   f'{", ".join(drives)} at the same times')
     told = [*findings, Defect('merged', int(kept.sum()), f'merged by stamp from {topics}')]
     if any(found.is_command for found in chosen.values()):

@@ -356,7 +356,7 @@ def _numbers(quantity: str, values: ArrayLike) -> Array:
     try:
         return as_numbers(values)
     except (TypeError, ValueError) as error:
-        raise MotionError(quantity, f'it holds what is no number ({error})', 'be numbers',
+        raise MotionError(quantity, f'it contains what is no number ({error})', 'be numbers',
                           'shape') from None
 
 

@@ -40,7 +40,7 @@ POLICY = {
     'ignored_joints': 'they are ignored',
     'incomplete_messages': 'those messages are ignored',
     'merged': 'samples are those of the first drive, the others lie between their neighbours',
-    'commanded_efforts': 'they stand for the efforts',
+    'commanded_efforts': 'they are used as efforts',
     'receive_times': 'the times at which the messages were recorded are used',
     'epoch_unit': 'they are read so',
     'gain_unused': 'they are taken as N m or N',

@@ -163,8 +163,8 @@ def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
     # A header of one word, or of many, is no table of ours: a letter, a log.
     head = ', '.join(table.names[:6])[:80] or 'numbers alone'
     raise UnreadableFileError(
-        table.path, f'not a recording as it is: the header must hold time and <drive>/position, '
-        f'but is {head!r}; '
+        table.path, f'not a recording in this form: the header must contain time and '
+        f'<drive>/position, but is {head!r}; '
         + (f'write columns: {{time: {likely}}} in the model file, or: ' if likely else '')
         + init_command(table.path.name[:40]))
 
@@ -207,7 +207,7 @@ def _require(table: Table, wanted: Sequence[Column]) -> None:
             close = meant(str(column), table.names)
             raise UnreadableFileError(
                 table.path, f'no column {column!r}' + (f' (did you mean {close}?)' if close else '')
-                + '; it holds ' + (', '.join(sorted(table.names)[:MOST]) or (
+                + '; it contains ' + (', '.join(sorted(table.names)[:MOST]) or (
                     f'{counted(getattr(table, "count", 0), "column")} without a header, must be '
                     'numbers from 1')))
 

@@ -227,7 +227,7 @@ def mechanism_keys(count: int) -> dict[str, Key]:
                'N m s/rad, N s/m', lower=0, **described),
         drives('friction.coulomb', 'F_c, dry friction; without it, as an MJCF says, else 0',
                'N m, N', lower=0, **described),
-        drives('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
+        drives('friction.offset', 'constant effort in addition to weight and friction', 'N m, N'),
         Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
             positive=True, default=0.01),
         drives('friction.reversal_velocities',

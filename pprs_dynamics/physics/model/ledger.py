@@ -121,7 +121,7 @@ def read_steps(values: Mapping[str, Any]) -> list[Step]:
     ModelError
         For a ledger that holds what it must not.
     """
-    rule = f'stand under {BLOCK}.step_01, step_02, …'
+    rule = f'be under {BLOCK}.step_01, step_02, …'
     if values.get(BLOCK):
         raise ModelError(BLOCK, values[BLOCK], rule)
     blocks = blocks_below(values, f'{BLOCK}.')
@@ -167,7 +167,7 @@ def without_last_step(values: Mapping[str, Any]) -> tuple[dict[str, Any], Step]:
     """
     steps = read_steps(values)
     if not steps:
-        raise ModelError(BLOCK, MISSING, 'hold a step that can be taken back')
+        raise ModelError(BLOCK, MISSING, 'contain a step that can be taken back')
     last, prefix = steps[-1], f'{BLOCK}.{step_name(len(steps))}.'
     for key in (*last.added, *last.previous):
         if key not in values and key not in last.removed:

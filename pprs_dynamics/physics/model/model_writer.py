@@ -128,7 +128,7 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
     lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH, keys),
              *_effects_block(values), *_ledger_section(values)]
     text = '\n'.join(lines) + '\n'
-    assert _same(parse_parameters(text), values), 'a model file must hold what was written'
+    assert _same(parse_parameters(text), values), 'a model file must contain what was written'
     return text
 
 

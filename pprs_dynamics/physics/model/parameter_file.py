@@ -78,11 +78,11 @@ def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any
     model, ledger = _parameters_blocks(path, parse(text, path))
     for key, value in (*_flatten(model), *_flatten(ledger)):
         if key in flat:
-            raise ModelError(key, value, 'stand once: nested, with dots, or in a section of its '
+            raise ModelError(key, value, 'occur once: nested, with dots, or in a section of its '
                              'own', str(path))
         flat[key] = value
         if isinstance(value, list) and len({type(element) for element in value}) > 1:
-            raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
+            raise ModelError(key, value, 'contain elements of one type, as ROS 2 demands '
                              '(write 0.0, not 0, among decimal numbers)', str(path))
     return flat
 
@@ -103,19 +103,19 @@ def _parameters_blocks(path: object, content: Any) -> tuple[Mapping[str, Any], M
     for node, block in content.items():
         if not isinstance(block, Mapping) or not isinstance(block.get('ros__parameters'), Mapping):
             raise UnreadableFileError(
-                path, f'not a model file: {node} must hold a mapping ros__parameters')
+                path, f'not a model file: {node} must contain a mapping ros__parameters')
         blocks[node] = block['ros__parameters']
     ledger = blocks.pop(LEDGER, {})
     for key, value in _flatten(ledger):
         if not key.startswith('history'):
-            raise ModelError(key, value, f'not stand under {LEDGER}, which holds history alone',
+            raise ModelError(key, value, f'not be under {LEDGER}, which contains history alone',
                              str(path))
     if '/**' in blocks:
         for node, block in blocks.items():
             for key, _ in _flatten(block) if node != '/**' else ():
                 if key in NAMES or key.startswith(ADDED):
                     raise UnreadableFileError(
-                        path, f'{key} of the model stands under {node}: put it under /**, for '
+                        path, f'{key} of the model is under {node}: put it under /**, for '
                         'every node and command alike')
         return blocks['/**'], ledger
     if len(blocks) != 1:

@@ -217,7 +217,7 @@ def _require_known(parameters: Mapping[str, Any]) -> None:
         if not any(key.startswith(f'{name}.') for key in in_blocks):
             raise UnknownNameError('key', name, (*keys, *NODE_KEYS))
         if value not in (None, {}):  # an empty block says nothing
-            raise ModelError(name, value, 'be a mapping, of names to what they hold')
+            raise ModelError(name, value, 'be a mapping, of names to their content')
 
 
 def is_known(name: str) -> bool:

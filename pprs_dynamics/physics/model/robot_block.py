@@ -127,7 +127,7 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
     if not given:
         raise ModelError('robot.urdf', MISSING, 'be given, or robot.mjcf instead')
     if len(given) > 1:
-        raise ModelError(given[1], values[given[1]], f'not stand beside {given[0]}')
+        raise ModelError(given[1], values[given[1]], f'not be given with {given[0]}')
     values[given[0]] = str(located(values[given[0]], folder))
     if given[0].endswith('mjcf'):
         from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
@@ -148,7 +148,7 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
     for name in [name for name in home if name.endswith(POSE)]:
         pose, link = home.pop(name), name.removesuffix(POSE)
         if not np.linalg.norm(pose[3:]) > 0:
-            raise ModelError(f'robot.home.{name}', list(pose), 'hold a quaternion that is not zero')
+            raise ModelError(f'robot.home.{name}', list(pose), 'have a quaternion that is not zero')
         if link not in description.links:
             raise UnknownNameError('link', link, description.links, 'robot.home')
         poses[link] = pose_frame(pose)
@@ -263,7 +263,7 @@ def passive_friction(structure: Structure, values: Mapping[str, Any],
         turns = joint < 0 or structure.tables.turns[joint]
         if turns and blocks[name]['coulomb'] and not blocks[name]['radius']:
             raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],
-                             'be greater than 0 beside coulomb: the load rubs at it [m]')
+                             'be greater than 0 with coulomb: the load rubs at it [m]')
     if blocks:
         yield ModelJointFriction(blocks)
 
@@ -285,8 +285,8 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             continue
         if len(values[key]) != size * len(bodies):
             names = ', '.join(structure.moved_by[int(row)] for row in bodies)
-            raise ModelError(key, list(values[key]), f'hold {size * len(bodies)} numbers, {size} '
-                             f'for each of {names}')
+            raise ModelError(key, list(values[key]), f'contain {size * len(bodies)} numbers, '
+                             f'{size} for each of {names}')
         given = np.reshape(values[key], (-1, size))
         inertial[:, first:first + size] = given[:, FROM_FILES] if size == 6 else given
     for row, (mass, *moment) in zip(bodies, inertial[:, :4], strict=True):
