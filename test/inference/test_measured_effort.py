@@ -219,7 +219,7 @@ def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[s
         said = json.loads((tmp_path / 'said.json').read_text())
         assert said['effort_looks_like'] == WITHOUT_GRAVITY
         told = ' '.join(capsys.readouterr().out.split())
-        assert 'as if gravity was taken out' in told
+        assert 'as if gravity was already subtracted' in told
     assert 'without_gravity' in told
     for command in (('adopt', 'payload_mass'), ('fit',)):
         assert main([*command, *given, '--output', str(tmp_path / 'x.yaml')]) == 1

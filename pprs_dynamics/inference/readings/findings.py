@@ -100,7 +100,7 @@ def columns_line(scales: Iterable[Scale], has_columns: bool = False) -> str:
     entries = [entry if not drive else f'{scalar(drive)}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
     if has_columns and entries:
-        return f'under columns, beside what stands there: {", ".join(entries)}'
+        return f'under columns, in addition to its content: {", ".join(entries)}'
     return f'columns: {{{", ".join(entries)}}}' if entries else ''
 
 
@@ -149,7 +149,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         gains = ', '.join(f'{1 / (other if scale == 1 else scale):.3g}' for scale in scales)
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
-           f'amperes (then write effort_kind: current, and beside urdf or mjcf  gain: [{gains}]), '
+           f'amperes (then write effort_kind: current, and under robot  gain: [{gains}]), '
            'percent of a torque, or another unit')
     else:
         for scale in dict.fromkeys(scales[scales != 1].tolist()):
@@ -369,14 +369,14 @@ def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence
     of = f'the effort of {named(model.drives, group)}'
     gravity = f'gravity ({_amount(content.gravity, content.gravity_doubt)})'
     inertia = f'inertia ({_amount(content.inertia, content.inertia_doubt)})'
-    beside = [gravity] * content.lacks_gravity + ['friction'] * (not content.has_friction)
-    lacks = f'{of} holds no {" nor ".join([inertia, *beside])}: it looks like'
+    others = [gravity] * content.lacks_gravity + ['friction'] * (not content.has_friction)
+    lacks = f'{of} contains no {" nor ".join([inertia, *others])}: it looks like'
     what = {
-        table.WITHOUT_GRAVITY: f'{of} holds no {gravity}: it looks as if gravity was taken out '
-        'already; else a counterweight bears it, or the base stands otherwise than the model says',
-        table.EXTERNAL: f'{of} holds no {inertia} nor {gravity}: it looks like an external torque, '
-        'from which a model was taken out already',
-        table.NOISE_FREE: f'{of} holds no noise: it looks computed, not measured',
+        table.WITHOUT_GRAVITY: f'{of} contains no {gravity}: it looks as if gravity was already '
+        'subtracted; or a counterweight bears it, or the base is mounted in another direction',
+        table.EXTERNAL: f'{of} contains no {inertia} nor {gravity}: it looks like an external '
+        'torque, from which a model was already subtracted',
+        table.NOISE_FREE: f'{of} contains no noise: it looks computed, not measured',
         table.POSITION_ERROR: f'{of} is {content.compliance:.2g} times what the model says: it '
         'looks like an error of position under the effort, or is in another unit'
         if content.compliance else f'{lacks} an error of position, which grows with the velocity, '
