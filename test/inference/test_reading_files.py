@@ -239,10 +239,11 @@ def test_seconds_and_their_fractions_may_be_columns_each(head: str, tmp_path: Pa
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
 
 
-@pytest.mark.parametrize('form', [
-    '%d.%m.%Y %H:%M:%S.%f', '%d.%m.%y %H:%M:%S,%f', '%Y-%m-%dT%H:%M:%S.%fZ', '%H:%M:%S.%f',
-    '%m/%d/%Y %I:%M:%S.%f %p', '%d.%m.%Y;%H:%M:%S.%f'])
-@pytest.mark.parametrize('title', ['Zeitstempel', ''])
+@pytest.mark.parametrize(('form', 'title'), [
+    *((form, 'Zeitstempel') for form in (
+        '%d.%m.%Y %H:%M:%S.%f', '%d.%m.%y %H:%M:%S,%f', '%Y-%m-%dT%H:%M:%S.%fZ', '%H:%M:%S.%f',
+        '%m/%d/%Y %I:%M:%S.%f %p', '%d.%m.%Y;%H:%M:%S.%f')),
+    ('%d.%m.%Y;%H:%M:%S.%f', ''), ('%H:%M:%S.%f', '')])
 def test_times_may_be_dates(form: str, title: str, tmp_path: Path) -> None:
     time, q, _, effort = run_of_arm()
     start = datetime(2026, 2, 13, 9, 59, 58)
