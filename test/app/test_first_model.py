@@ -336,11 +336,6 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     assert 'guessed: no header: columns 2 to 4 taken as positions' in before
     assert main(['info', 'run.csv', '--model', 'robot.yaml']) == 0
     capsys.readouterr()
-    assert main(['init', 'arm.urdf']) == 2
-    assert 'exists already' in capsys.readouterr().err
-    assert (tmp_path / 'robot.yaml').read_text() == before
     (tmp_path / 'robot.yaml').unlink()
     assert main(['init', 'arm.urdf']) == 0
     assert 'pprs info RECORDING' in ' '.join(capsys.readouterr().out.split())
-    assert main(['init', 'arm.urdf', 'none.csv', '--output', 'y.yaml']) == 2
-    assert not (tmp_path / 'y.yaml').exists()

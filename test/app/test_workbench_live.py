@@ -22,7 +22,6 @@ from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from workbench_server import workbench
 
-from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
@@ -124,11 +123,3 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         found = awaited(lambda found: found['monitor_error'] and min(
             found['error'][0] or 0.0, found['monitor_error'][0] or 0.0) > 0.5)
         awaited(lambda found: not found['can_restore'])
-
-
-def test_arguments_that_ros_does_not_take_are_a_sentence(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(['workbench', '--live', '--no-browser', '--ros-args', '-r', '__ns:=cell']) == 2
-    assert "pprs workbench: --ros-args: failed to initialize rcl: Couldn't parse remap rule" in (
-        capsys.readouterr().err)

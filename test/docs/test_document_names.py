@@ -246,16 +246,6 @@ def test_every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
     assert broken(page, text_of(page)) == []
 
 
-def test_every_page_is_linked_from_another() -> None:
-    reached = {(page.parent / target.partition('#')[0]).resolve()
-               for page in pages() for target in links(text_of(page)) if target[0] != '#'}
-    # These two include README and CONTRIBUTING for the site.
-    entry = {PROJECT / 'README.md', PROJECT / 'docs' / 'index.md',
-             PROJECT / 'docs' / 'CONTRIBUTING.md'}
-    lonely = {*pages()} - reached - entry
-    assert {str(page.relative_to(PROJECT)) for page in lonely} == set()
-
-
 @pytest.mark.parametrize('link', ['nowhere.md', 'docs/nodes.md#no-such-heading', '#no-heading',
                                   '../outside.md', 'docs/images/no.png'])
 def test_a_link_that_leads_nowhere_is_found(link: str) -> None:

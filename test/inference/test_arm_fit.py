@@ -13,13 +13,13 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
+from made_once import diagnose
 from model_recordings import with_effects
 from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.fit.arm_fit import fit_arm, pseudo_inertia
 from pprs_dynamics.inference.fit.base_fit import fit_base
 from pprs_dynamics.inference.residuals.measuring import measure_residuals

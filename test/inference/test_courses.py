@@ -11,13 +11,13 @@ from pathlib import Path
 import made_up_arm
 import numpy as np
 import pytest
+from made_once import diagnose
 from model_recordings import with_effects
 from scipy.signal import butter, lfilter
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 MODEL = DriveModel.load()

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import diagnose
 from model_recordings import TIME, record, with_effects
 from single_axis import axis, axis_recording
 
 from benchmarks.hidden.recordings import Case, Scene, make_case
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.experiments.motion_design import platform_motion
 from pprs_dynamics.inference.regression.base_columns import ModelNumber

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_once import diagnose
 from made_up_arm import motion, real_arm
 from planar_arm import planar_arm
 from single_axis import axis_values
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.regression.design import Design

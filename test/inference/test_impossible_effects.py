@@ -10,6 +10,7 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
+from made_once import diagnose
 from shared_cases import shared_case
 from single_axis import axis_motion
 
@@ -17,7 +18,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_once import diagnose
 from made_up_arm import FRICTION, motion, real_arm
 from model_recordings import with_effects
 from numpy.testing import assert_allclose
@@ -19,7 +20,6 @@ from planar_arm import planar_arm
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.measurement.files.recording import Recording

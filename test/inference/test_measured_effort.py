@@ -17,6 +17,7 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
+from made_once import diagnose
 from shared_cases import shared_case
 from single_axis import axis, axis_motion, axis_recording
 
@@ -24,7 +25,6 @@ from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.readings.findings import (
     OtherReading,

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_once import diagnose
 from single_axis import axis, axis_recording
 
 from pprs_dynamics import DriveModel, Recording
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 

@@ -16,7 +16,7 @@ import pytest
 from made_up_files import ARM, SLIDE, arm_efforts, drawn, motion
 
 from pprs_dynamics.app.api.first_model import FirstModel, first_model
-from pprs_dynamics.errors import MotionError, PprsError
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings.columns import GuessError
 from pprs_dynamics.measurement.files.bag_files import write_bag
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
@@ -310,18 +310,6 @@ def test_a_velocity_by_its_name_alone_is_not_used(tmp_path: Path) -> None:
     first = asked_about(tmp_path, 't,q1,q2,dq1,dq2,tau1,tau2', time, q, noise, effort)
     assert any('is not the derivative of q1' in note for note in first.notes)
     assert 'velocity' not in first.text.partition('columns:')[2].replace('called a velocity', '')
-
-
-def test_a_recording_that_cannot_be_checked_is_a_question(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def fails(*_: object, **__: object) -> None:
-        raise MotionError('recording', 'it fails', 'not fail', 'shape')
-
-    monkeypatch.setattr('pprs_dynamics.app.api.first_model.find_mistakes', fails)
-    time, q, _, effort = run_of_arm()
-    assert 'it fails' in ''.join(asked_about(
-        tmp_path, 't,q1,q2,tau1,tau2', time, q, effort).questions)
 
 
 @pytest.mark.parametrize('head', ['t,q1,q2,tau_ref1,tau_ref2', 't,q_cmd1,q_cmd2,tau1,tau2'])
