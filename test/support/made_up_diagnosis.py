@@ -12,7 +12,12 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RankedSet
+from pprs_dynamics.inference.diagnosis.diagnosis import (
+    Diagnosis,
+    EffectAlone,
+    FoundEffect,
+    RankedSet,
+)
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -78,7 +83,7 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
     fields: dict[str, Any] = {
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
-            ranked_effect(e.name, e.drives, e.evidence, e.error_after) for e in effects),
+            EffectAlone(e.name, e.drives, e.evidence, e.error_after) for e in effects),
         'suspects': (), 'depends_on': (), 'sets': (), 'barred': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),
@@ -107,10 +112,4 @@ def calibration(after: float = 1.02) -> Calibration:
     return Calibration('masses.payload', None, 1.0, 0.02, 'kg', after, 0.002)
 
 
-def ranked_effect(name: str, drives: tuple[str, ...] | None, evidence: float,
-                  error_after: float) -> RankedSet:
-    """Return an effect alone with its evidence."""
-    return RankedSet(((name, drives),), CostTerms(names=-evidence), error_after=error_after)
-
-
-SUSPECT = ranked_effect('effort_offset', ('slide_3',), -4.2, 0.06)
+SUSPECT = EffectAlone('effort_offset', ('slide_3',), -4.2, 0.06)
