@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.inference.readings.mounting import MOUNTING
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
@@ -25,7 +26,6 @@ if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
-MOUNTING = 'mounting'  # kind of a finding on the direction of gravity
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 CHECK = 'Check units, signs and zeros, and that the file describes this machine'

@@ -39,6 +39,7 @@ from pprs_dynamics.inference.readings.findings import (
     near,
     velocity_factors,
 )
+from pprs_dynamics.inference.readings.mounting import MOUNTING, other_mounting
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -125,6 +126,11 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
                 ' and '.join(mistake.what for mistake in each) or PLAIN for each in each_of),
             ' or '.join(line for each in each_of for line in lines_of(each, has_columns)))]
     kinds = {mistake.kind for mistake in mistakes}
+    if mistakes and (other := other_mounting(model, [recording], is_oblique=True)):
+        # Of readings only gravity along axes is one: others come near to an oblique one.
+        looks = other[model.drives[0]]
+        return (OtherReading.of(MOUNTING, model.drives, range(len(model.drives)), looks.what,
+                                looks.line),)
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
             likely[0].reading.time_unit if likely else 1.0))
