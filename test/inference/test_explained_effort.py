@@ -119,3 +119,6 @@ def test_noise_that_is_slow_is_for_no_model_to_explain(tmp_path: Path) -> None:
     noisy.measured[:, 0] = residuals.model[:, 0] + slow
     assert set(little_explained(model, noisy)) == {'turn'}
     assert little_explained(model, noisy, noise={'turn': float(slow.std())}) == {}
+    # Where nearly all is noise, the rest is less than the error of its variance.
+    noisy.measured[:, 0] = residuals.model[:, 0] + 5 * slow
+    assert little_explained(model, noisy, noise={'turn': 0.99 * 5 * float(slow.std())}) == {}

@@ -6,14 +6,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import scipy.signal
+from made_up_diagnosis import found_effect
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adopt import _Case
+from pprs_dynamics.inference.diagnosis.answer import on_other_drives, unconfirmed_effects
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import (
     COURSE_TIMES,
@@ -22,6 +26,7 @@ from pprs_dynamics.inference.search.candidates import (
     SINCE,
     Component,
     Course,
+    EffectCandidate,
     PriorCosts,
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -205,3 +210,28 @@ def test_asymmetric_friction_claims_dry_and_viscous_friction_apart() -> None:
     # What claims one thing only claims as many as it has sets of coefficients.
     spring = CATALOGUE['hysteresis']
     assert len(spring.hypotheses(('force',)) | spring.hypotheses(('coefficient',))) == 2
+
+
+@pytest.mark.parametrize(('in_errors', 'kept'), [
+    ((5.0, -5.0), [0]), ((-5.0, 5.0), [1]), ((5.0, 5.0), []), ((-5.0, -5.0), [])])
+def test_an_effect_is_not_reported_on_drives_that_held_out_data_refute(
+    in_errors: tuple[float, float], kept: list[int],
+) -> None:
+    effect = CATALOGUE['effort_offset']
+    candidate = EffectCandidate.of([Component.of(effect, d, {}, ('force',)) for d in (0, 1)])
+    assert [component.drive for component in on_other_drives(
+        candidate, DRIVES, gain(*in_errors))] == kept
+
+
+@pytest.mark.parametrize(('rises', 'count'), [(0.9, 0), (1.1, 2)])
+def test_effects_that_raise_the_error_together_are_not_confirmed(
+    rises: float, count: int,
+) -> None:
+    """Two effects that cancel each other each lower the error beside the other."""
+    effects = (found_effect('load_friction'), found_effect('hysteresis'))
+    answer: Any = SimpleNamespace(
+        effects=effects, over_noise=root_mean_square, remaining=np.full((9, 1), rises),
+        given=SimpleNamespace(error=np.ones((9, 1))))
+    unconfirmed = unconfirmed_effects(answer)
+    assert [effect.name for effect in unconfirmed] == [effect.name for effect in effects][:count]
+    assert all('with all reported effects' in effect.objection for effect in unconfirmed)

@@ -30,6 +30,7 @@ from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
     CandidateSet,
+    Component,
     CostTerms,
     EffectCandidate,
     UnknownCandidate,
@@ -132,8 +133,10 @@ class Answer:
         rivals = self._rivals()
         depends = (*self._passing(), *self._depends_on())
         above = self._above_noise()
+        known = {drive: level for drive, level in self.noise_levels.items()
+                 if drive not in self.unseen}
         little = little_explained(self.adopted, table.first.design.residuals, self.remaining,
-                                  self.decisions, self.noise_levels)
+                                  self.decisions, known)
         drifts = any(effect.course is not None and effect.course.kind != SINCE
                      for effect in effects)
         verdict = ('unknown' if unconfirmed or depends or above or little or drifts
@@ -346,23 +349,43 @@ def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
     """Return the answer of a table: that of the row of least cost.
 
     Where an effect of it is not confirmed, the verdict is `unknown`, and the answer is that of the
-    row without it.
+    row without it. On drives that are predicted worse with it, the effect is not reported.
     """
+    fits = table.best.fits
+    unconfirmed: tuple[FoundEffect, ...] = ()
     answer = Answer(table, table.best, validate)
-    unconfirmed = unconfirmed_effects(answer)
-    if unconfirmed:
-        names = {effect.name for effect in unconfirmed}
-        rest = tuple(c for c in table.best.fitted.candidates if c.name not in names)
-        fits = table.best.fits
-        answer = Answer(table, Row(fits, fits.evaluate(rest), 0.0), validate)
+    while refuted := {effect.name: effect for effect in unconfirmed_effects(answer)}:
+        rest: list[EffectCandidate | UnknownCandidate] = []
+        for candidate in answer.fitted.candidates:
+            effect = refuted.get(candidate.name)
+            if effect is None:
+                rest.append(candidate)
+            elif kept := on_other_drives(candidate, answer.drives, effect.gain):
+                rest.append(EffectCandidate.of(kept))
+            else:
+                unconfirmed = (*unconfirmed, effect)
+        answer = Answer(table, Row(fits, fits.evaluate(tuple(rest)), 0.0), validate)
     return answer.diagnosis(unconfirmed)
+
+
+def on_other_drives(candidate: EffectCandidate | UnknownCandidate, drives: Sequence[str],
+                    gain: PredictiveGain | None) -> list[Component]:
+    """Return an effect's parts on the drives that held-out data do not refute; none for all."""
+    losing = () if gain is None else gain.losing
+    kept = [component for component in candidate.components
+            if component.drive is not None and drives[component.drive] not in losing]
+    return kept if len(kept) < len(candidate.components) else []
 
 
 @outside_cost('an effect that raises the error, on the recordings or held out, is not confirmed: '
               '`unknown`')
 def unconfirmed_effects(answer: Answer) -> tuple[FoundEffect, ...]:
-    """Return the effects of a row that data do not confirm."""
-    return tuple(effect for effect in answer.effects if effect.objection)
+    """Return the effects of a row that data do not confirm: all where they cancel each other."""
+    effects = answer.effects
+    if effects and answer.over_noise(answer.remaining) >= answer.over_noise(answer.given.error):
+        return tuple(replace(effect, objection=effect.objection or (
+            'with all reported effects the error does not fall')) for effect in effects)
+    return tuple(effect for effect in effects if effect.objection)
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),

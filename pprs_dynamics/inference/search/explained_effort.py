@@ -23,6 +23,9 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 CONSTANT = 1e-9  # of an effort's size, below which a change of it is rounding
 # Third differences of white noise have this many times its variance (1 + 9 + 9 + 1).
 THIRD_DIFFERENCES = 20.0
+# Of the variance of an effort that is not noise, below which nothing can be said of a model: the
+# variance of a noise is known to 10 % from 200 independent samples.
+LEAST_BEYOND_NOISE = 0.1
 
 
 def explained_shares(residuals: Residuals, left: Array | None = None) -> dict[str, float]:
@@ -85,7 +88,8 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
             is_little = np.nanvar(residuals.model[np.isfinite(effort), d]) > np.nanvar(effort)
         else:
             of_noise = noise.get(name, 0.0) ** 2 / max(float(np.nanvar(effort)), 1e-300)
-            is_little = share < decisions.explained * max(1 - of_noise, 0.0)
+            is_little = (1 - of_noise > LEAST_BEYOND_NOISE
+                         and share < decisions.explained * (1 - of_noise))
         if is_little:
             little[name] = float(np.nan_to_num(share))  # of a constant nothing is explained
     return dict(sorted(little.items(), key=lambda item: item[1]))
