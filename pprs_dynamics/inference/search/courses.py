@@ -35,7 +35,7 @@ ONSETS, STRETCHES, STRETCH_LENGTHS = 50, 40, (1, 4)
 COURSE_HALVINGS = 8  # of the step between them, around the best
 COURSE_TRIALS = 6  # candidates of a scan that are fitted
 FIRST_TIMES = 5  # parts of the recordings, between which effects that are not reported are tested
-PRUNED = 6  # sets that are simplified
+REFINED = 6  # of the fitted sets of a round
 MOST_COURSES = 3  # effects of one set that change within the recordings
 SINGLE = float(np.finfo(np.float32).eps)  # share of a force's squares that is rounding
 Alone = list[tuple[CandidateSet, EffectCandidate]]
@@ -88,10 +88,10 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
                         key=lambda offer: -offer.gain)
         # Its shape was that of an effect that is there all the time. Times that are samples off
         # cost more than a pattern of no catalogue, which needs none.
-        tried = sorted((fits.refined(_refined(fits, fits.evaluate((*rest, offer.candidate))))
-                        for offer in _best_of_each(offers)
-                        for rest in _rests(best, offer.candidate)), key=lambda found: found.total)
-        found = min([*map(fits.pruned, tried[:PRUNED]), *tried], key=lambda fitted: fitted.cost,
+        offered = sorted((fits.evaluate((*rest, offer.candidate)) for offer in _best_of_each(offers)
+                          for rest in _rests(best, offer.candidate)), key=lambda found: found.total)
+        tried = [fits.refined(_refined(fits, found)) for found in offered[:REFINED]]
+        found = min([*map(fits.pruned, tried), *tried], key=lambda fitted: fitted.cost,
                     default=best)
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
@@ -126,10 +126,10 @@ def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
     What is there for a stretch hardly shows in a fit of all the time: the search need not have
     proposed it.
     """
-    base = fits.evaluate(()).fit
+    nothing = fits.evaluate(())
     candidates = [EffectCandidate.of([component]) for d in sorted(drives)
-                  for component, _ in fits.components.local[d].offers(base).values()]
-    return [(fits.evaluate((candidate,)), candidate) for candidate in candidates
+                  for component, _ in fits.components.local[d].offers(nothing.fit).values()]
+    return [(fits.at_noise_of(nothing, (candidate,)), candidate) for candidate in candidates
             if _is_new(candidate)]
 
 

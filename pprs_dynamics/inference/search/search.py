@@ -102,7 +102,8 @@ class Search:
                 for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
                     simplified(self.fits, fitted)
             for fitted in self._inadmissible():
-                self._fit(self._replacements(fitted))
+                self._fit(self._with_others(fitted))
+                self._fit(reduced(fitted, component) for component in fitted.blocks)
             simplified(self.fits, self.best)
             self._fit(self._with_same_form())
             if (not self.best.cost < before - LEAST_IMPROVEMENT
@@ -183,6 +184,15 @@ class Search:
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
+        yield from self._with_others(best)
+        for candidate in best.effects:
+            for component in candidate.components if candidate.effect.shape else ():
+                yield from self._reshaped(best, candidate, component)
+            if len(candidate.components) > 1:
+                yield from self._divided(best, candidate)
+
+    def _with_others(self, best: CandidateSet) -> Iterator[Candidates]:
+        """Yield sets in which another effect replaces one or two candidates, or one on a drive."""
         for candidate in best.candidates:
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             yield from self._instead(best, best.without(candidate), None)
@@ -193,11 +203,6 @@ class Search:
         for a, b in combinations(best.blocks, 2):
             if a.drive == b.drive is not None:
                 yield from self._instead(best, reduced(best, a, b), REPLACEMENTS, a.drive)
-        for candidate in best.effects:
-            for component in candidate.components if candidate.effect.shape else ():
-                yield from self._reshaped(best, candidate, component)
-            if len(candidate.components) > 1:
-                yield from self._divided(best, candidate)
 
     def _reshaped(self, best: CandidateSet, candidate: EffectCandidate, component: Component,
                   ) -> Iterator[Candidates]:
