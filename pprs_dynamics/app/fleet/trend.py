@@ -88,7 +88,6 @@ class Trend(JsonRecord):
         return f'{displayed(self.robot)}, {self.name}: {steps}'
 
 
-
 @dataclass(frozen=True)
 class FleetTrends(JsonRecord):
     """All trends of a store.
@@ -124,7 +123,6 @@ class FleetTrends(JsonRecord):
         if self.refused:
             sentences.append(f'{counted(len(self.refused), "recording")} gave no result.')
         return sentences
-
 
 
 def fleet_trends(store: str) -> FleetTrends:
@@ -181,8 +179,8 @@ def find_steps(time: Any, value: Array, series: int = 1) -> tuple[TrendStep, ...
     except ImportError:
         raise MissingLibraryError('ruptures', 'finding changes', 'fleet') from None
     changes = np.diff(value) / 2 ** 0.5
-    scatter = NORMAL * float(np.median(np.abs(changes - np.median(changes)))) if len(value) > 1 \
-        else 0.0
+    scatter = (NORMAL * float(np.median(np.abs(changes - np.median(changes))))
+               if len(value) > 1 else 0.0)
     count = len(value)
     if count < LEAST_RECORDINGS or scatter <= ROUNDING * float(np.abs(value).max()):
         return ()
@@ -192,5 +190,5 @@ def find_steps(time: Any, value: Array, series: int = 1) -> tuple[TrendStep, ...
     parts = np.split(value, places[:-1])
     return tuple(
         TrendStep(time.iloc[place].isoformat(), float(before.mean()), float(after.mean()),
-             scatter * (1 / len(before) + 1 / len(after)) ** 0.5)
+                  scatter * (1 / len(before) + 1 / len(after)) ** 0.5)
         for place, before, after in zip(places, parts, parts[1:], strict=False))
