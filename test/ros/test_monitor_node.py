@@ -199,21 +199,21 @@ FOREIGN = [  # on the status topic of the node that drives
     '{"model": {"sha256": "a", "files": []}, "robot": "r", "changes": null}']
 
 
-def test_a_status_of_another_program_does_not_end_the_monitor() -> None:
-    with bench() as running:
-        monitor = running.add(MonitorNode, parameter_overrides=overrides())
-        publisher = running.probe.create_publisher(String, '/feedforward/status', LATCHED)
-        assert running.spin_until(publisher.get_subscription_count)
-        for text in FOREIGN:
-            publisher.publish(String(data=text))
-            running.spin_for(0.02)
-        assert monitor._owner.difference() == ''
-        publisher.publish(bytes(serialize_message(String(data='cut off')))[:-3])
-        model = {'sha256': 'another', 'files': [{'file': '/somewhere/robot.yaml'}]}
-        publisher.publish(String(data=json.dumps({'robot': 'r', 'model': model, 'changes': 2})))
-        assert running.spin_until(monitor._owner.difference)
-        assert monitor._owner.status.files == ('robot.yaml',)
-        assert monitor._owner.status.fingerprint != DriveModel.load().fingerprint
+def test_a_status_of_another_program_does_not_end_the_monitor(monitor: MonitorBench) -> None:
+    publisher = monitor.bench.probe.create_publisher(String, '/feedforward/status', LATCHED)
+    assert monitor.bench.spin_until(publisher.get_subscription_count)
+    for text in FOREIGN:
+        publisher.publish(String(data=text))
+        monitor.bench.spin_for(0.02)
+    monitor.send(100)
+    assert monitor.says('OK')
+    publisher.publish(bytes(serialize_message(String(data='cut off')))[:-3])
+    model = {'sha256': 'another', 'files': [{'file': '/somewhere/robot.yaml'}]}
+    publisher.publish(String(data=json.dumps({'robot': 'r', 'model': model, 'changes': 2})))
+    monitor.bench.spin_for(0.2)
+    monitor.send(100)
+    assert monitor.says('MODEL')
+    assert '(sha256 another, not ' in monitor.bench.status[-1]['message']
 
 
 # The monitor says what changed on the running robot, over topics, and it is adopted.

@@ -126,10 +126,10 @@ def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
     What is there for a stretch hardly shows in a fit of all the time: the search need not have
     proposed it.
     """
-    nothing = fits.evaluate(())
+    base = fits.evaluate(()).fit
     candidates = [EffectCandidate.of([component]) for d in sorted(drives)
-                  for component, _ in fits.components.local[d].offers(nothing.fit).values()]
-    return [(fits.at_noise_of(nothing, (candidate,)), candidate) for candidate in candidates
+                  for component, _ in fits.components.local[d].offers(base).values()]
+    return [(fits.evaluate((candidate,)), candidate) for candidate in candidates
             if _is_new(candidate)]
 
 
