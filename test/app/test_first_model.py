@@ -263,6 +263,9 @@ def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path
         first_model(robot, [tmp_path / 'c.csv'])
     with pytest.raises(FirstModelError, match='joint_map'):
         first_model(robot, bag(tmp_path, ('uno', 'due', 'tre')))
+    np.savetxt(tmp_path / 'd.txt', Q.ravel())
+    with pytest.raises(GuessError, match='`paste - - - < FILE > NEW` joins 3 lines'):
+        first_model(robot, [tmp_path / 'd.txt'])
     (tmp_path / 'x.urdf').write_text('<robot name="x"><link name="a"/></robot>')
     with pytest.raises(FirstModelError, match='no joint of it moves'):
         first_model(tmp_path / 'x.urdf')

@@ -135,6 +135,10 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     if not left:
         raise GuessError('no column has numbers other than times, must be positions of the '
                          'joints beside times')
+    if len(left) == 1 < len(joints) and not left[0].title:
+        raise GuessError(
+            f'each line has one number, must have one for each of {len(joints)} joints: '
+            f'`paste {"- " * len(joints)}< FILE > NEW` joins {len(joints)} lines to one')
     stamp: Columns = {('', key): column for key, column in (
         ('time', None if time is None else time.column), ('time_fraction', fraction))
         if column is not None}
