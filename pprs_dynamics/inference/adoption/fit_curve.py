@@ -136,7 +136,7 @@ def fit_curve(residuals: Residuals, request: EffectRequest) -> FittedCurve:
     noise = regression.fit((block(FLEXIBLE),))
     best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
                key=lambda fit: fit.deviance)
-    parts = np.arange(len(residuals)) * BLOCKS // len(residuals)
+    parts = residuals.blocks(BLOCKS)
     others = np.stack([fit.coefficients for fit in regression.from_others(best, parts)])
     precision = best.blocks[0].precision
     freedom = len(best.coefficients) - float(np.trace(best.covariance @ precision))

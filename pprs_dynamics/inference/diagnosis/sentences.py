@@ -442,8 +442,7 @@ def largest_fall(diagnosis: Diagnosis, error: Array, less: Array) -> tuple[str, 
     falls = []
     for drive, noise in diagnosis.noise_floors.items():
         d = diagnosis.residuals.drives.index(drive)
-        before, after = (root_mean_square(values[:, d]) for values in (
-            error, less))
+        before, after = (root_mean_square(values[:, d]) for values in (error, less))
         falls.append(((before - after) / max(noise, 1e-300), drive, before, after))
     return max(falls)[1:]
 

@@ -503,9 +503,7 @@ def _sized(residuals: Residuals, columns: Array, d: int, features: Sequence[Arra
 
 def _parts(residuals: Residuals) -> Integers:
     """Return which run each sample is of; of a single one, which block of it."""
-    if residuals.record[-1]:
-        return residuals.record
-    return np.minimum(np.arange(len(residuals)) * BLOCKS // len(residuals), BLOCKS - 1)
+    return residuals.record if residuals.record[-1] else residuals.blocks(BLOCKS)
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int]) -> Processes:

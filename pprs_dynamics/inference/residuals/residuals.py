@@ -104,6 +104,10 @@ class Residuals:
                  'be recorded with the positions (<drive>/effort in a CSV, effort in JointState)')
         _require(self.period > 0, 'period', f'it is {self.period}', 'be greater than 0 s')
 
+    def blocks(self, count: int) -> Integers:
+        """Return in which of `count` blocks of equal length each sample is, (M,)."""
+        return np.arange(len(self)) * count // len(self)
+
     def __len__(self) -> int:
         return len(self.time)
 

@@ -176,7 +176,7 @@ def hold_out(fits: FittedSets, fitted: CandidateSet,
         Whose forces the predictions of `error` contain; by default those of all effects.
     """
     regression, fit = fits.regression, fitted.fit
-    parts = np.arange(len(regression.residuals)) * BLOCKS // len(regression.residuals)
+    parts = regression.residuals.blocks(BLOCKS)
     others = regression.from_others(fit, parts)
     coefficients = np.stack([fit.coefficients for fit in others])
     plain = coefficients.copy()
