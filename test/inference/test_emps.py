@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import pytest
-from made_once import diagnose
 
 from benchmarks import ROOT
 from benchmarks.real import emps as real_drive
 from benchmarks.real import emps_files as emps
 from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics.inference.adoption.adopt import adopt_all
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 DATA = find_data('emps', emps.IDENTIFICATION)

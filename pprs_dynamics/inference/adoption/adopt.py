@@ -515,7 +515,7 @@ def adopt_all(
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     diagnosis : Diagnosis, optional
-        Of the model as given, where it is known already.
+        Of the model as given, with its table, where it is known already.
     reference : Reference, optional
         As in `adopt`.
 
@@ -526,7 +526,7 @@ def adopt_all(
     """
     report = progress or (lambda what, share: None)
     given = original(model)
-    if diagnosis is None or given is not model:
+    if diagnosis is None or diagnosis.selection is None or given is not model:
         diagnosis = diagnose(given, recordings, (), lambda share: report('diagnosing', share),
                              reference=reference)
     rivals = {names[0] for names in diagnosis.indistinguishable}
