@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import socket
 import webbrowser
+from types import FrameType
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError, PprsError
@@ -66,6 +67,12 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
 
     class Server(uvicorn.Server):
         """Server that closes the event streams of browsers at shutdown, which it would wait for."""
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            # Ctrl-C reaches a process of `ros2 launch` twice. The second would end the server
+            # without its shutdown: the node of --live would go on, and the process abort.
+            if not self.should_exit:
+                super().handle_exit(sig, frame)
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             hub.is_over = True
