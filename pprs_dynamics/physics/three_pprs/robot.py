@@ -497,7 +497,8 @@ class ThreePprs(Alike):
         table = np.empty((rows, len(motion), 6))
         if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
             return None
-        return tree.InverseDynamicsResult(None, table, table[closed_form.POSITION:][:3])
+        return tree.InverseDynamicsResult(
+            None, table, table[closed_form.POSITION:closed_form.GUIDE_LOAD])
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
         """Return the robot as a mechanism; see `tree_structure`."""
