@@ -39,7 +39,6 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.system.parallel import lazy
 
 
 def placed(design: Design, effect: type[CatalogueEffect], drive: int | None,
@@ -78,13 +77,13 @@ class DriveComponents:
         self.design = design
         self._places: dict[type[DriveEffect], slice] = {}
 
-    @lazy
+    @cached_property
     def effects(self) -> list[type[DriveEffect]]:
         """Effects that the drive may have, without those that all drives feel."""
         return [effect for effect in searched_in_drives(self.design)
                 if self.design.acts_on(effect, self.d) and not effect.shifts_positions()]
 
-    @lazy
+    @cached_property
     def score_test(self) -> ScoreTest[Component]:
         """All shapes in all variants that the rows of a scan suffice for."""
         entries: list[Entry[Component]] = []

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,6 @@ from pprs_dynamics.inference.search.patterns import (
     build_families,
     trial_limits,
 )
-from pprs_dynamics.system.parallel import lazy
 
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
 FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
@@ -139,7 +138,7 @@ class DrivePatterns:
         vars(found).pop('_columns', None)
         return found
 
-    @lazy
+    @cached_property
     def _transformed(self) -> list[_Transformed]:
         samples = hash(self.series.index.tobytes())
 
@@ -152,7 +151,7 @@ class DrivePatterns:
         return [_once(self._shared, family, partial(transformed, family)) for family in families
                 if self.with_plain_forms or not (family.paired or family.is_plain)]
 
-    @lazy
+    @cached_property
     def _columns(self) -> list[Columns]:
         return [Columns(self.regression, {self.d: transformed.rows})
                 for transformed in self._transformed]

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -26,7 +27,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     TRANSMITTED,
     InverseDynamicsResult,
 )
-from pprs_dynamics.system.parallel import lazy
 
 Motion = JointMotion | PlatformMotion
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
@@ -201,14 +201,14 @@ class MechanismState(JointMotion):
         """Names of the drives."""
         return self.robot.drives
 
-    @lazy
+    @cached_property
     def inverse_dynamics(self) -> InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
         return self.robot.inverse_dynamics(self)
 
-    @lazy
+    @cached_property
     def links(self) -> Any:
         """The kinematics: a `LinkMotion`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.kinematics(self) if self.known is None else self.known
@@ -220,18 +220,18 @@ class MechanismState(JointMotion):
                          else self.inverse_dynamics.q)
         return closed
 
-    @lazy
+    @cached_property
     def reactions(self) -> Any:
         """Frictionless efforts and reactions: `Loads`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.loads(self.links, self.load)
 
-    @lazy
+    @cached_property
     def direction(self) -> Array:
         """Sign of the velocity, sgn, turning over within the reversal velocity."""
         direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
         return direction
 
-    @lazy
+    @cached_property
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
         return self.transmitted + self.robot.armature * self.acceleration
@@ -246,7 +246,7 @@ class MechanismState(JointMotion):
                           else self.inverse_dynamics.efforts[TRANSMITTED])
         return efforts
 
-    @lazy
+    @cached_property
     def friction_load(self) -> Array:
         """Load of a drive's guide or gear [N m, N], without a sign; 0 if it is not known."""
         return self.robot.friction_load(self)
