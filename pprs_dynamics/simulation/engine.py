@@ -86,9 +86,7 @@ class MechanismEngine:
         placed = {body.name: structure.links[body.name] for body in spec.bodies[1:]
                   if body.name in structure.links}
         # MuJoCo's world is the root of the description, ours its base.
-        hung = {joint.child for joint in structure.description.joints.values()}
-        root = next(name for name in structure.description.links if name not in hung)
-        self.root = structure.links[root][1]
+        self.root = structure.links[structure.description.root][1]
         self._frames = {0: self.root}
         of_row: dict[int, str] = {}
         for name, (row, frame) in placed.items():

@@ -37,21 +37,17 @@ class Branch:
 
 def root_of(description: Description) -> str:
     """Return the link that hangs on none, or what hangs on it by a floating joint."""
-    children = {joint.child: joint for joint in description.joints.values()}
-    root = next(link for link in description.links if link not in children)
-    floating = [joint.child for joint in children.values()
-                if joint.kind == FLOATING and joint.parent == root]
-    return floating[0] if len(floating) == 1 and len(
-        [joint for joint in children.values() if joint.parent == root]) == 1 else root
+    on_root = [joint for joint in description.joints.values() if joint.parent == description.root]
+    is_carried = len(on_root) == 1 and on_root[0].kind == FLOATING
+    return on_root[0].child if is_carried else description.root
 
 
 def branch_to(description: Description, tool: str) -> Branch:
     """Return the chain between the base and a link."""
-    hung = {joint.child: joint for joint in description.joints.values()}
     joints: list[Joint] = []
     link = tool
-    while link in hung:
-        joint = hung[link]
+    while link in description.hung:
+        joint = description.hung[link]
         if joint.kind not in (FIXED, FLOATING) and joint.mimic is None:
             joints.append(joint)
         link = joint.parent

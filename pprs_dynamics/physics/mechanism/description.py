@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -174,6 +175,16 @@ class Description:
     remarks: tuple[str, ...] = ()
     transmissions: tuple[Transmission, ...] = ()
     faults: tuple[str, ...] = ()
+
+    @cached_property
+    def hung(self) -> dict[str, Joint]:
+        """The joint that each link hangs on, by link."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @property
+    def root(self) -> str:
+        """The link that hangs on no other."""
+        return next(link for link in self.links if link not in self.hung)
 
 
 def moved_along(joint: Joint, position: float) -> Frame:

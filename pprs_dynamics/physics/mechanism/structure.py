@@ -404,8 +404,7 @@ class _Builder:
         below: dict[str, list[Joint]] = {}
         for joint in joints.values():
             below.setdefault(joint.parent, []).append(joint)
-        children = {joint.child for joint in joints.values()}
-        root = next(link for link in self.description.links if link not in children)
+        root = self.description.root
         self.links[root] = (0, self._root(root, base))
         waiting = [root]
         followers: list[tuple[int, Joint]] = []
@@ -433,9 +432,8 @@ class _Builder:
     def _root(self, root: str, base: str) -> Frame:
         """Return the root's frame in the base's; no drive moves one against the other."""
         link, frame = base, Frame()
-        hung = {joint.child: joint for joint in self.description.joints.values()}
         while link != root:
-            joint = hung[link]
+            joint = self.description.hung[link]
             if not self._is_locked(joint):
                 raise ModelError('robot.base', base, 'be a link that no joint moves, but '
                                  f'{joint.name} ({joint.kind}) does')

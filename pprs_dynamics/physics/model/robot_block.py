@@ -225,9 +225,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
 def described_gravity(structure: Structure) -> tuple[float, ...]:
     """Return gravity in the base, turned from the frame of the description's root."""
     description = structure.description
-    hung = {joint.child for joint in description.joints.values()}
-    root = next(link for link in description.links if link not in hung)
-    _, frame = structure.links[root]
+    _, frame = structure.links[description.root]
     turned = frame.R @ np.array(description.gravity or STANDARD_GRAVITY)
     return tuple(float(component) for component in turned)
 
