@@ -36,10 +36,6 @@ class Walk:
     ----------
     at : int
         The place, which may be beyond the end.
-    words : list of int
-        Places of all length words until then.
-    arrays : list of (int, int)
-        Place of the first number, and count of elements, of all sequences of numbers until then.
 
     Raises
     ------
@@ -49,7 +45,7 @@ class Walk:
 
     def __init__(self, data: bytes) -> None:
         self._data, self._word = data, WORD if data[1] == LITTLE_ENDIAN[1] else _BIG_WORD
-        self.at, self.words, self.arrays = HEADER, list[int](), list[tuple[int, int]]()
+        self.at = HEADER
 
     def over(self, size: int, alignment: int = 4) -> None:
         """Skip that many bytes of values."""
@@ -62,7 +58,6 @@ class Walk:
         # Every element takes a byte at least: more is garbage, and would loop for ever.
         if count > len(self._data):
             raise struct.error
-        self.words.append(place)
         self.at = place + WORD.size
         return count
 
@@ -81,10 +76,9 @@ class Walk:
         count = self.count()
         if count:
             self.over(8 * each * count, 8)
-        self.arrays.append((self.at - 8 * each * count, count))
 
-    def header(self) -> list[slice]:
-        """Skip a header and the names of joints, and return the places of the names."""
+    def header(self) -> None:
+        """Skip a header and the names of joints."""
         self.over(STAMP.size)
         self.text()
-        return self.texts()
+        self.texts()

@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.joint_state_cdr import JointStateBlocks
+from pprs_dynamics.measurement.files.joint_states import JointStates
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,
@@ -117,7 +117,7 @@ def test_drives_are_found_by_name_among_other_joints_in_any_order(tmp_path: Path
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), orders=st.integers(1, 40), big_endian=st.booleans())
-def test_reading_bytes_by_layout_agrees_with_rosbags(
+def test_collected_messages_agree_with_rosbags(
     seed: int, orders: int, big_endian: bool,
 ) -> None:
     # Any number of joints and orders, sequences that are absent, names of any length.
@@ -134,9 +134,9 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
         state = made.message(shuffle.randrange(2**31 * 10**9), names, *arrays)
         little = not (big_endian and k % 3 == 0)
         data.append(bytes(made.STORE.serialize_cdr(state, made.STATE, little_endian=little)))
-    blocks = JointStateBlocks(DRIVES)
-    blocks.add(data[:70], list(range(70)))
-    blocks.add(data[70:], list(range(70, 120)))
+    blocks = JointStates(DRIVES)
+    for k, raw in enumerate(data):
+        blocks.add(raw, k)
     assert blocks.names == set(joints)
     states = [made.STORE.deserialize_cdr(raw, made.STATE) for raw in data]
     whole = [k for k, state in enumerate(states)
@@ -160,20 +160,20 @@ def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str)
     state = JointState(name=['b', 'other', 'a'], **values)
     state.header.stamp.sec, state.header.stamp.nanosec = 12, 345
     state.header.frame_id = frame
-    blocks = JointStateBlocks(('a', 'b'))
-    blocks.add([serialize_message(state)] * 3, [0, 1, 2])
+    blocks = JointStates(('a', 'b'))
+    blocks.add(serialize_message(state), 0)
     stamps, _, *arrays = blocks.arrays()
-    assert stamps.tolist() == [12 * 10**9 + 345] * 3
+    assert stamps.tolist() == [12 * 10**9 + 345]
     for name, array in zip(made.QUANTITIES, arrays, strict=True):
         expected = [np.nan, np.nan] if name in absent else [3.5, 1.5]
-        np.testing.assert_array_equal(array, [expected] * 3)
+        np.testing.assert_array_equal(array, [expected])
 
 
 @settings(max_examples=200)
 @given(data=st.binary(max_size=200), start=st.booleans())
 def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None:
-    blocks = JointStateBlocks(DRIVES)
-    blocks.add([b'\x00\x01\x00\x00' + data if start else data], [0])
+    blocks = JointStates(DRIVES)
+    blocks.add(b'\x00\x01\x00\x00' + data if start else data, 0)
     assert blocks.samples == 0
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +16,7 @@ from pprs_dynamics.drives import DriveColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files import signals
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
-from pprs_dynamics.measurement.files.joint_state_cdr import (
-    JOINT_STATE,
-    JointStateBlocks,
-    message_types,
-)
+from pprs_dynamics.measurement.files.joint_states import JOINT_STATE, JointStates, message_types
 from pprs_dynamics.measurement.files.merged_states import (
     CONTROLLER,
     DYNAMIC,
@@ -48,8 +43,7 @@ LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
 STORAGE = {'.mcap': 'MCAP', '.db3': 'SQLITE3'}
-# Messages handled at a time: a few megabytes of bytes and objects.
-BLOCK = 8192
+REPORTED = 8192  # messages between two reports of progress
 
 
 def read_bag(
@@ -88,25 +82,24 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
     name = connections[0].topic
     if connections[0].msgtype != JOINT_STATE:
         return read_merged(bag, connections, drives, findings)
-    blocks = JointStateBlocks(drives)
+    states = JointStates(drives)
     total = sum(connection.msgcount for connection in connections)
-    messages, done = bag.messages(connections), 0
-    while block := list(islice(messages, BLOCK)):
-        blocks.add([data for _, _, data in block], [stamp for _, stamp, _ in block])
-        done += len(block)
-        if progress is not None:
+    done = 0
+    for done, (_, stamp, data) in enumerate(bag.messages(connections), 1):
+        states.add(data, stamp)
+        if progress is not None and (done % REPORTED == 0 or done == total):
             progress(done, max(total, done))
     if not done:
         raise UnreadableFileError(bag.path, f'{name} contains no messages')
-    if not blocks.samples:
-        if blocks.twice:
+    if not states.samples:
+        if states.twice:
             raise UnreadableFileError(
-                bag.path, f'messages on {name} name {", ".join(sorted(blocks.twice))} twice: which '
+                bag.path, f'messages on {name} name {", ".join(sorted(states.twice))} twice: which '
                 'value is that of the drive is not known; record each joint once')
-        if set(drives) <= blocks.names:  # spread over several messages
+        if set(drives) <= states.names:  # spread over several messages
             return read_merged(bag, connections, drives, findings)
-        _tell_missing(bag.path, name, drives, blocks)
-    stamps, received, position, velocity, effort = blocks.arrays()
+        _tell_missing(bag.path, name, drives, states)
+    stamps, received, position, velocity, effort = states.arrays()
     if mixed := [drive for drive, values in zip(drives, position.T, strict=True)
                  if signals.alternates(values)]:
         raise UnreadableFileError(
@@ -122,7 +115,7 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
         findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
         stamps = received
-    findings += _ignored(name, done, drives, blocks)
+    findings += _ignored(name, done, drives, states)
     epoch = whole_epoch(stamps / 1e9)
     return Samples(drives, (stamps - epoch * 10**9) / 1e9, position,
                    None if np.all(np.isnan(velocity)) else velocity, effort, epoch, f'bag, {name}',
@@ -259,27 +252,27 @@ def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
 
 
 def _tell_missing(
-    path: Path, topic: str, drives: tuple[str, ...], blocks: JointStateBlocks,
+    path: Path, topic: str, drives: tuple[str, ...], states: JointStates,
 ) -> None:
-    missing = [drive for drive in drives if drive not in blocks.names]
+    missing = [drive for drive in drives if drive not in states.names]
     if missing:
         raise UnreadableFileError(
             path, f'{topic} lacks {", ".join(missing[:MOST])}; it contains '
-            + (', '.join(sorted(blocks.names)[:MOST]) or 'no names')
-            + f'; {missing_names(drives, blocks.names, path.name[:40])}')
+            + (', '.join(sorted(states.names)[:MOST]) or 'no names')
+            + f'; {missing_names(drives, states.names, path.name[:40])}')
     raise UnreadableFileError(
         path, f'no single message on {topic} contains positions of all of {", ".join(drives)}')
 
 
 def _ignored(
-    topic: str, messages: int, drives: tuple[str, ...], blocks: JointStateBlocks,
+    topic: str, messages: int, drives: tuple[str, ...], states: JointStates,
 ) -> list[Defect]:
     findings = []
-    others = sorted(blocks.names - set(drives))
+    others = sorted(states.names - set(drives))
     if others:
         findings.append(Defect('ignored_joints', len(others),
                                f'{topic} also contains {", ".join(others)}'))
-    skipped = messages - blocks.samples
+    skipped = messages - states.samples
     if skipped:
         findings.append(Defect(
             'incomplete_messages', skipped,

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.csv_files import ZSTANDARD, zstd
-from pprs_dynamics.measurement.files.joint_state_cdr import message_types
+from pprs_dynamics.measurement.files.joint_states import deserialized, message_types
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.system.files import readable, require_file
 
@@ -131,11 +131,9 @@ class Bag:
         """
         types = self.types(connections)
         for connection, received, data in islice(self.messages(connections), most):
-            try:
-                message = types.deserialize_cdr(data, connection.msgtype)
-            except Exception:  # of any kind, as the bytes are
-                continue
-            yield connection, received, message
+            message = deserialized(types, data, connection.msgtype)
+            if message is not None:
+                yield connection, received, message
 
     def types(self, connections: Collection[Connection]) -> Any:
         """Return the message types of ROS 2 and those that the bag defines."""

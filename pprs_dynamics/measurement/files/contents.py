@@ -16,7 +16,7 @@ from pprs_dynamics.measurement.files.array_files import WIDEST
 from pprs_dynamics.measurement.files.bag_files import CONTROLLER_TYPES
 from pprs_dynamics.measurement.files.bag_storage import Bag, is_bag, opened_bag
 from pprs_dynamics.measurement.files.csv_files import CsvTable
-from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
+from pprs_dynamics.measurement.files.joint_states import JOINT_STATE
 from pprs_dynamics.measurement.files.merged_states import states_of
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import open_table

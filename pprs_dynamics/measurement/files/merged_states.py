@@ -26,7 +26,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import Bag, damaged
-from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
+from pprs_dynamics.measurement.files.joint_states import JOINT_STATE
 from pprs_dynamics.measurement.files.name_hints import MOST
 from pprs_dynamics.measurement.files.samples import (
     CURRENT,

@@ -142,10 +142,10 @@ def lost_to_zero(effort: Array) -> tuple[Mask, float]:
     # Of a coarse converter most steps are 0.
     usual = float(max(np.quantile(steps, ZERO_QUANTILE), np.min(steps[steps > 0])))
     for first, last in runs(np.abs(effort) <= usual):
-        before, after = known[known < first][-1:], known[known > last][:1]
-        if last - first >= ZERO_SAMPLES or not (len(before) and len(after)):
+        before, after = np.searchsorted(known, (first, last + 1)).tolist()
+        if last - first >= ZERO_SAMPLES or not 0 < before <= after < len(known):
             continue
-        left, right = effort[before[0]], effort[after[0]]
+        left, right = effort[known[before - 1]], effort[known[after]]
         far = min(abs(left), abs(right))
         if left * right > 0 and far > ZERO_RATIO * max(usual, abs(right - left)):
             found[first:last + 1] = True
