@@ -10,6 +10,7 @@ import errno
 import os
 import re
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from itertools import islice
 from typing import Any
 
@@ -261,6 +262,14 @@ class MissingLibraryError(PprsError, ImportError):
         super().__init__(
             f'{purpose} needs the library {library}, which is not installed: '
             f"pip install 'pprs_dynamics[{extra}]'")
+
+
+def optional_library(module: str, library: str, purpose: str, extra: str) -> Any:
+    """Import a module, or raise MissingLibraryError, which names the extra that installs it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        raise MissingLibraryError(library, purpose, extra) from None
 
 
 def _shorten(value: Any) -> str:

@@ -38,7 +38,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     readers_for,
 )
 from pprs_dynamics.ros.node.clocks import CommandWatchdog
-from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
+from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch, hold_controller
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
@@ -285,17 +285,9 @@ class FeedforwardNode(ManagedNode):
     def _on_controller(self, state: Any) -> None:
         """Let a controller hold with gravity where it would hold without."""
         self._controller.heard(state, self._has_sent)
-        if (self._watchdog is None or self.state != 'active' or self._watchdog.fresh
-                or self._settings.node_values['timeout_action'] != HOLD_GRAVITY
-                or (reference := self._controller.take_hold()) is None):
-            return
-        try:
-            held = self._feedforward.hold_at(reference)
-            self._send_hold(DriveTrajectory.holding(held.forces.drive_motion, held.effort))
-        except PprsError as error:
-            self.get_logger().warning(f'the controller holds without gravity: {error}')
-        else:
-            self.get_logger().info('the controller has become active: it holds with gravity')
+        if (self._watchdog is not None and self.state == 'active' and not self._watchdog.fresh
+                and self._settings.node_values['timeout_action'] == HOLD_GRAVITY):
+            hold_controller(self, self._controller, self._feedforward.hold_at, self._send_hold)
 
     def _send_hold(self, held: DriveTrajectory) -> None:
         """Let the trajectory controller hold a pose at rest from now on."""
@@ -328,7 +320,7 @@ class FeedforwardNode(ManagedNode):
                     else f'no valid trajectory for {timeout:g} s') + f': {done}'
             self._status.report('STALE', 'STALE', text)
 
-    def _stop_work(self) -> None:
+    def finish(self) -> None:
         """Do the timeout's action now where a command is in force, and see it off."""
         if self._watchdog is None or not self._watchdog.fresh:
             return

@@ -170,7 +170,7 @@ class MonitorNode(ManagedNode):
             f'answers lag by half the window of {self._settings.node_values["window"]:g} s; ready')
         return super().on_activate(state)
 
-    def _stop_work(self) -> None:
+    def finish(self) -> None:
         """End the process that diagnoses."""
         self._worker.close()
 

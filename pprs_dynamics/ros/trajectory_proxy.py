@@ -31,7 +31,6 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.force_command import (
     STILL,
-    DriveTrajectory,
     Feedforward,
     parameters_for,
     warn_without_limits,
@@ -47,7 +46,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     TrajectoryRequest,
     readers_for,
 )
-from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
+from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch, hold_controller
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, node_parameter, with_changed
@@ -158,17 +157,11 @@ class TrajectoryProxyNode(Node):
             self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
         self._controller.heard(state, self._counters['passed_on'] > 0)
         # In the middle of a goal, which has its own efforts, a hold would replace it.
-        if not self._relay.is_idle or (reference := self._controller.take_hold()) is None:
-            return
-        model = self._settings.model
-        try:
-            held = Feedforward(model, self._settings.node_values).hold_at(reference)
-        except PprsError as error:
-            self.get_logger().warning(f'the controller holds without gravity: {error}')
-            return
-        self._hold.publish(DriveTrajectory.holding(
-            held.forces.drive_motion, held.effort).message(0, RobotNames.of(model)))
-        self.get_logger().info('the controller holds with gravity')
+        if self._relay.is_idle:
+            model, node_values = self._settings.model, self._settings.node_values
+            hold_controller(self, self._controller,
+                            lambda position: Feedforward(model, node_values).hold_at(position),
+                            lambda held: self._hold.publish(held.message(0, RobotNames.of(model))))
 
     def _check_in_time(self, goal: Any, sent_at: int) -> None:
         """Check that a goal's motion can be over.
@@ -205,15 +198,12 @@ class TrajectoryProxyNode(Node):
         Raises
         ------
         PprsError
-            Where it breaks a rule, has ended already, or ends in motion.
+            As `_filled`, and where it has ended already.
         """
         filled = self._filled(goal)
         duration = _duration(filled, self.get_clock().now().nanoseconds)
         if duration < 0:
             raise Rejection('TIME', f'the trajectory ended {-duration:.3f} s ago')
-        if max(np.abs(filled.trajectory.points[-1].velocities)) > STILL:
-            raise Rejection('LIMIT', 'the last point is in motion: the controller would never '
-                            'report that the goal is reached; end at rest')
         return filled, duration
 
     def _filled(self, goal: Any) -> Any:
@@ -222,14 +212,15 @@ class TrajectoryProxyNode(Node):
         Raises
         ------
         PprsError
-            Where it breaks a rule.
+            Where it breaks a rule, or ends in motion.
         """
         model, node_values = self._settings.model, self._settings.node_values
         feedforward = Feedforward(model, node_values)
         answer = feedforward.answer(self._request(model, goal))
-        velocity = answer.forces.drive_motion[1]
-        is_still = np.abs(velocity[-1]).max() <= STILL  # else it is refused
-        drives = feedforward.ending_at_rest(answer, SETTLING if is_still else 0.0)
+        if np.abs(answer.forces.drive_motion[1][-1]).max() > STILL:
+            raise Rejection('LIMIT', 'the last point is in motion: the controller would never '
+                            'report that the goal is reached; end at rest')
+        drives = feedforward.ending_at_rest(answer, SETTLING)
         trajectory = drives.message(0, RobotNames.of(model))
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives

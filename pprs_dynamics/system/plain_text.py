@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import codecs
+from collections.abc import Sequence
 
 # Name of the error handler for streams that are not UTF-8.
 PLAIN = 'pprs_plain'
@@ -29,6 +30,12 @@ def counted(count: int, thing: str) -> str:
     if count != 1:
         noun = f'{noun[:-1]}ies' if noun.endswith('dy') else f'{noun}s'
     return f'{count} {noun}{" " * bool(rest)}{rest}'
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """Return 'a, b, c and 4 more'."""
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return ', '.join(names[:most]) + more
 
 
 def _escaped(character: str) -> str:

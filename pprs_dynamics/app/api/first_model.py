@@ -409,7 +409,7 @@ def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
         if words & {'time', *TIME_LIKE}:
             kinds.append(FILE_TIME)
         if kinds:
-            found.setdefault(kinds[-1] if len(kinds) > 1 else kinds[0], file)
+            found.setdefault(kinds[-1], file)
     return found
 
 

@@ -77,7 +77,7 @@ class SimulationResult(Result):
 
     def view(self) -> Any:
         """Return what the terminal shows; the injected effects are not shown."""
-        return (f'{len(self.recording.time)} samples at {self.rate:g} Hz, '
+        return (f'{self.samples} samples at {self.rate:g} Hz, '
                 f'{counted(len(self.effects), "effect")} hidden')
 
     def page(self) -> Page:

@@ -27,7 +27,7 @@ from pprs_dynamics.simulation.export.exported_robot import (
 )
 from pprs_dynamics.simulation.export.replay import Replayed, replay
 from pprs_dynamics.system.files import write_text
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import displayed, first_of
 
 ENDINGS = {URDF: ('.urdf',), MJCF: ('.xml', '.mjcf')}
 FEW = 8  # names that the terminal lists
@@ -93,5 +93,4 @@ def _print_summary(screen: Any, model: DriveModel, found: Replayed, left: tuple[
          for name, unit, *numbers in zip(
              model.drives, (units.effort for units in model.units), found.effort, found.error,
              strict=True)]))
-    more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
-    screen.print(f'Not expressed in the file: {shown(", ".join(left[:FEW]) or "nothing")}{more}')
+    screen.print(f'Not expressed in the file: {shown(first_of(left, FEW) or "nothing")}')

@@ -141,19 +141,16 @@ def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
                   for name, each in found.channels.items())):
             if bounds is not None:
                 column = columns.names.get(quantity, f'{joint}/{quantity}')
-                rows.append((escape(str(column)), escape(drive), quantity, unit + (
-                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds) + (
-                        f' ({found.measured:.1%} measured)'
-                        if quantity in ('current', 'effort') and found.measured < 1 else '')))
+                scale = f', {factor:.4g} of the column' if factor != 1 else ''
+                share = (f' ({found.measured:.1%} measured)'
+                         if quantity in ('current', 'effort') and found.measured < 1 else '')
+                rows.append((escape(str(column)), escape(drive), quantity, f'{unit}{scale}',
+                             f'{bounds[0]:.4g} … {bounds[1]:.4g}{share}'))
     return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows, right=(),
                       caption=escape(summary.source), title=escape(
                           f'{summary.name}: {summary.used} of {summary.samples} samples in '
                           f'{counted(len(summary.segments), "segment")}, '
                           f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
-
-
-def _span(bounds: tuple[float, float] | None) -> str:
-    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
 
 
 def describe_mechanism(model: DriveModel) -> MechanismJson:

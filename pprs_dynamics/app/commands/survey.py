@@ -24,7 +24,7 @@ from pprs_dynamics.app.fleet.recordings import (
 )
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine, key, model_of, requests_of
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.errors import MissingLibraryError, PprsError
+from pprs_dynamics.errors import PprsError, optional_library
 from pprs_dynamics.system.plain_text import counted
 
 LOOPBACK = '127.0.0.1'
@@ -75,12 +75,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     SchedulerError
         If it cannot be reached.
     """
-    try:
-        import dask
-        import distributed
-    except ImportError:
-        raise MissingLibraryError('distributed', 'a survey', 'fleet') from None
-    library: Any = distributed  # its functions have no types
+    library, dask = (optional_library(name, 'distributed', 'a survey', 'fleet')
+                     for name in ('distributed', 'dask'))
     settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
                 # What waits at a worker that dies would count as what killed it.
                 'distributed.scheduler.worker-saturation': 1.0,

@@ -17,7 +17,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+from pprs_dynamics.errors import PprsError, UnreadableFileError, optional_library
 from pprs_dynamics.measurement.files.bag_storage import is_bag_folder
 from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.system.files import new_file
@@ -92,12 +92,9 @@ class SurveyedRecording:
 
 def pandas() -> Any:
     """Return pandas with pyarrow, or raise MissingLibraryError."""
-    try:
-        import pandas as pd
-        import pyarrow  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError('pandas and pyarrow', 'a survey', 'fleet') from None
-    return pd
+    _, library = (optional_library(name, 'pandas and pyarrow', 'a survey', 'fleet')
+                  for name in ('pyarrow', 'pandas'))
+    return library
 
 
 def find_recordings(patterns: Sequence[str]) -> Iterator[SurveyedRecording]:

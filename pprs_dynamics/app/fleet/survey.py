@@ -21,9 +21,9 @@ import numpy as np
 
 from pprs_dynamics import __version__
 from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, SurveyedRecording
-from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.comparison import Localisation, compare
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -108,7 +108,7 @@ def examine(job: SurveyJob) -> list[dict[str, Any]]:
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
 
 
-Judged = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
+Judged = tuple[list[dict[str, Any]], dict[str, dict[str, Any]], str]
 """Rows of values, numbers by drive, and the verdict."""
 
 
@@ -154,17 +154,11 @@ def _refuse_mistakes(model: DriveModel, recording: Recording, job: SurveyJob) ->
         raise UnreadableFileError(displayed(job.entry.path), finding.text)
 
 
-def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, float]]:
+def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, Any]]:
     """Return rms, relative error and noise of every drive that was measured."""
-    found = {}
-    for d, drive in enumerate(residuals.drives):
-        known = np.isfinite(residuals.measured[:, d])
-        if known.any():
-            rms = root_mean_square(residuals.error[known, d])
-            swing = float(np.std(residuals.measured[known, d]))
-            found[drive] = {'rms': rms, 'relative': rms / swing if swing else float('nan'),
-                            'noise': float(noise.get(drive, np.nan))}
-    return found
+    compared = compare(residuals, Localisation((), {}), noise)
+    return {name: {'rms': drive.rms, 'relative': drive.relative, 'noise': drive.noise_floor}
+            for name, drive in compared.drives.items()}
 
 
 def _as_in_model(diagnosis: Diagnosis, reported: Container[tuple[str | None, str]],

@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, pandas, read_rows
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.errors import optional_library
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, with_uncertainty
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.system.json_records import JsonRecord
@@ -174,10 +174,7 @@ def find_steps(time: Any, value: Array, series: int = 1) -> tuple[TrendStep, ...
     series : int
         How many are looked at.
     """
-    try:
-        from ruptures import KernelCPD
-    except ImportError:
-        raise MissingLibraryError('ruptures', 'finding changes', 'fleet') from None
+    library = optional_library('ruptures', 'ruptures', 'finding changes', 'fleet')
     changes = np.diff(value) / 2 ** 0.5
     scatter = (NORMAL * float(np.median(np.abs(changes - np.median(changes))))
                if len(value) > 1 else 0.0)
@@ -185,7 +182,7 @@ def find_steps(time: Any, value: Array, series: int = 1) -> tuple[TrendStep, ...
     if count < LEAST_RECORDINGS or scatter <= ROUNDING * float(np.abs(value).max()):
         return ()
     penalty = 2 * np.log(count * series / FALSE_ALARMS)
-    search: Any = KernelCPD(kernel='linear', min_size=LEAST_SEGMENT)
+    search = library.KernelCPD(kernel='linear', min_size=LEAST_SEGMENT)
     places = search.fit(value[:, None] / scatter).predict(pen=penalty)
     parts = np.split(value, places[:-1])
     return tuple(

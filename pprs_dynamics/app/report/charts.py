@@ -13,7 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits, common_unit
-from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.errors import optional_library
 from pprs_dynamics.measurement.files.recording import Recording
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
@@ -27,11 +27,7 @@ SECONDS = {'ticksuffix': ' s', 'showticksuffix': 'last', 'hoverformat': '.3f'}
 
 def plotly_objects() -> Any:
     """Return plotly.graph_objects, or raise MissingLibraryError."""
-    try:
-        from plotly import graph_objects
-    except ImportError:
-        raise MissingLibraryError('plotly', 'the report', 'report') from None
-    return graph_objects
+    return optional_library('plotly.graph_objects', 'plotly', 'the report', 'report')
 
 
 def figure(traces: Iterable[Any], height: int, **layout: Any) -> Any:

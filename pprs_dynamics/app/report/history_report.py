@@ -13,7 +13,7 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, plain, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
-from pprs_dynamics.system.plain_text import counted
+from pprs_dynamics.system.plain_text import counted, first_of
 
 NOTHING = 'No effect was added to this model yet.'
 MOST_LISTED = 3  # numbers of the model that a line names
@@ -39,17 +39,12 @@ def details(step: Step) -> list[str]:
              f'version {step.version}']
     if step.calibrated:
         found.append(f'{counted(len(step.calibrated), "number of the model")} changed as well: '
-                     f'{_first_of(step.calibrated)}')
+                     f'{first_of(step.calibrated, MOST_LISTED)}')
     if step.rivals:
         found.append(f'rivals, which explain the recordings as well: {", ".join(step.rivals)}')
     if step.forced:
         found.append(f'adopted in spite of objections: {"; ".join(step.objections)}')
     return [entry for entry in found if entry]
-
-
-def _first_of(labels: Sequence[str]) -> str:
-    more = len(labels) - MOST_LISTED
-    return ', '.join([*labels[:MOST_LISTED], f'{more} more'] if more > 0 else labels)
 
 
 def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:

@@ -110,9 +110,7 @@ class Page:
         """Add what the page is of, so that it can be filed: labelled lines behind a title."""
         self.heading('Record')
         with self.fold('Date, version, command and files'):
-            terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
-                            for label, text in lines)
-            self._body.append(f'<dl class="record">{terms}</dl>')
+            self._body.append(f'<dl class="record">{_terms(lines)}</dl>')
 
     def bullets(self, lines: Iterable[str], numbered: bool = False) -> None:
         """Add a list."""
@@ -156,10 +154,9 @@ class Page:
         noisy = any(row.noise is not None for row in rows)
         body = []
         for row in rows:
-            values = [row.before, *([row.after] if len(names) > 1 else []),
-                      *([row.noise] if noisy else [])]
-            cells = ''.join(f'<td>{_force(value)}</td>' for value in values)
-            shown = (('before', row.before), ('after', row.after), ('noise', row.noise))
+            shown = [('before', row.before), *[('after', row.after)] * (len(names) > 1),
+                     *[('noise', row.noise)] * noisy]
+            cells = ''.join(f'<td>{_force(value)}</td>' for _, value in shown)
             bar = ''.join(_bar(kind, value / largest) for kind, value in shown
                           if value is not None and value == value)
             body.append(f'<tr><th scope="row">{escape(row.label)}</th>{cells}'
@@ -184,10 +181,8 @@ class Page:
     def card(self, lines: Iterable[tuple[str, str]], figures: Iterable[tuple[Any, str]] = (),
              ) -> None:
         """Add a framed finding: labelled lines, and figures with captions below them."""
-        terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
-                        for label, text in lines)
         drawn = ''.join(self._drawn(figure, caption, False) for figure, caption in figures)
-        self._body.append(f'<section class="card"><dl>{terms}</dl>'
+        self._body.append(f'<section class="card"><dl>{_terms(lines)}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
@@ -238,6 +233,11 @@ def _data(name: str, content: str) -> str:
     """Return JSON for a script element, with end tags escaped."""
     safe = content.replace('<', '\\u003c')
     return f'<script type="application/json" id="{name}">{safe}</script>'
+
+
+def _terms(lines: Iterable[tuple[str, str]]) -> str:
+    """Return labelled lines as a list of terms."""
+    return ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>' for label, text in lines)
 
 
 def _bar(kind: str, share: float) -> str:

@@ -9,12 +9,11 @@ import io
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from threading import Event, Thread
 from time import monotonic
 from typing import Any
 
-from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.errors import optional_library
 from pprs_dynamics.system.plain_text import PLAIN, displayed
 
 # A notebook's output cell: what it shows has the width and the font of a terminal.
@@ -44,10 +43,7 @@ def console(**options: Any) -> Any:
 
 def _rich(name: str) -> Any:
     """Return a module of rich, or raise MissingLibraryError."""
-    try:
-        return import_module(f'rich.{name}')
-    except ImportError:
-        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+    return optional_library(f'rich.{name}', 'rich', 'showing tables', 'report')
 
 
 def escape(text: str) -> str:

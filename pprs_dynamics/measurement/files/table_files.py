@@ -32,7 +32,7 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     whole_epoch,
 )
-from pprs_dynamics.system.plain_text import counted
+from pprs_dynamics.system.plain_text import counted, first_of
 
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
@@ -246,8 +246,7 @@ def _ignored(table: Table, wanted: Sequence[Column]) -> tuple[Defect, ...]:
     others = [name or '(no name)' for name in every if name not in used]
     if not others:
         return ()
-    return (Defect('ignored_columns', len(others), 'not used: ' + ', '.join(others[:10])
-                   + (f' and {len(others) - 10} more' if len(others) > 10 else '')),)
+    return (Defect('ignored_columns', len(others), f'not used: {first_of(others, 10)}'),)
 
 
 def _prefix(

@@ -180,20 +180,18 @@ def nanoseconds(moment: Time | Duration) -> int:
 
 def time(moment: int) -> Time:
     """Return a stamp from nanoseconds."""
-    sec, nanosec = seconds_and_rest(moment)
-    return Time(sec=sec, nanosec=nanosec)
+    return Time(**_divided(moment))
 
 
 def duration(moment: int) -> Duration:
     """Return a duration from nanoseconds."""
-    sec, nanosec = seconds_and_rest(moment)
-    return Duration(sec=sec, nanosec=nanosec)
+    return Duration(**_divided(moment))
 
 
-def seconds_and_rest(moment: int) -> tuple[int, int]:
-    """Return seconds, held within what messages can say, and nanoseconds of a time [ns]."""
-    seconds, rest = divmod(moment, NANOSECONDS)
-    return min(seconds, LATEST_SECOND), rest
+def _divided(moment: int) -> dict[str, int]:
+    """Return seconds, at most those that a message can contain, and nanoseconds of a time [ns]."""
+    seconds, nanoseconds = divmod(moment, NANOSECONDS)
+    return {'sec': min(seconds, LATEST_SECOND), 'nanosec': nanoseconds}
 
 
 def doubles(values: Array) -> array[float]:

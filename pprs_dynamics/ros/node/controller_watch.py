@@ -14,9 +14,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from rclpy.node import Node
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.ros.force_command import STILL
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.ros.force_command import STILL, DriveTrajectory, ForceCommand
 from pprs_dynamics.ros.messages.conversions import LARGEST
 
 STATE_TOPIC = 'controller_state'  # beside the controller's joint_trajectory
@@ -191,6 +193,20 @@ class ControllerWatch:
             yield ('trajectories end in motion, which it takes only with '
                    'allow_nonzero_velocity_at_trajectory_end: true; or set stop_time here')
         yield 'its log has the reason'
+
+
+def hold_controller(node: Node, watch: ControllerWatch, hold_at: Callable[[Array], ForceCommand],
+                    send: Callable[[DriveTrajectory], None]) -> None:
+    """Let a controller hold with gravity where it would hold without."""
+    if (reference := watch.take_hold()) is None:
+        return
+    try:
+        held = hold_at(reference)
+        send(DriveTrajectory.holding(held.forces.drive_motion, held.effort))
+    except PprsError as error:
+        node.get_logger().warning(f'the controller holds without gravity: {error}')
+    else:
+        node.get_logger().info('the controller holds with gravity')
 
 
 def _forget(entries: deque[Any], before: float) -> None:

@@ -64,8 +64,8 @@ class ManagedNode(LifecycleNode):
         self._made.append((destroy, entity))
         return entity
 
-    def _stop_work(self) -> None:
-        """Do what must be done before nothing is answered any more."""
+    def finish(self) -> None:
+        """Do what must be done before the node stops answering, or its process ends."""
 
     def begin(self, autostart: bool) -> None:
         """Wait for a supervisor, or go through its transitions.
@@ -104,7 +104,7 @@ class ManagedNode(LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer nothing any more."""
-        self._stop_work()
+        self.finish()
         self._enter('inactive', 'INACTIVE', 'waiting to be activated')
         return super().on_deactivate(state)
 
@@ -116,14 +116,10 @@ class ManagedNode(LifecycleNode):
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End for good; the process goes on telling so until it is stopped."""
-        self._stop_work()
+        self.finish()
         self.destroy_topics()
         self._enter('finalized', 'FINALIZED', 'shut down')
         return super().on_shutdown(state)
-
-    def finish(self) -> None:
-        """Do what must be done before the process ends."""
-        self._stop_work()
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Go where rclpy goes after a transition that failed."""

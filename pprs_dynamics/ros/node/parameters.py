@@ -75,9 +75,8 @@ class NodeParameter(Key):
         if isinstance(self.default, int):
             # true is a whole number to Python.
             if (not isinstance(value, type(self.default))
-                    or isinstance(value, bool) != isinstance(self.default, bool)):
-                raise ModelError(self.name, value, self.rule)
-            if not self.lower <= value <= self.upper:
+                    or isinstance(value, bool) != isinstance(self.default, bool)
+                    or not self.lower <= value <= self.upper):
                 raise ModelError(self.name, value, self.rule)
             return value
         return super().check(value)
