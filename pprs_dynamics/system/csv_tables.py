@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from os import PathLike
 
@@ -14,8 +12,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.system.files import new_file
-
-ROWS = 10_000  # written at a time
 
 
 def write_table(path: str | PathLike[str], header: Sequence[str], columns: Sequence[Array]) -> None:
@@ -26,12 +22,8 @@ def write_table(path: str | PathLike[str], header: Sequence[str], columns: Seque
     UnreadableFileError
         If it cannot be written.
     """
-    names = io.StringIO()
-    csv.writer(names, lineterminator='\n').writerow(header)
+    import pandas as pd  # takes a third of a second
+
+    table = pd.DataFrame(np.column_stack(columns), columns=list(header))
     with new_file(path) as file:
-        file.write(names.getvalue().encode())
-        # Twice as fast as DataFrame.to_csv.
-        for start in range(0, len(columns[0]), ROWS):
-            rows = np.column_stack([values[start:start + ROWS] for values in columns]).tolist()
-            text = '\n'.join([','.join(map(repr, row)) for row in rows]) + '\n'
-            file.write(text.replace('nan', '').encode())
+        table.to_csv(file, index=False, lineterminator='\n')
