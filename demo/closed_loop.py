@@ -37,7 +37,7 @@ LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted
 AHEAD = 0.05  # [s] that each pose is sent before its moment, as a trajectory controller is fed
 RATE = 200.0  # [Hz]
 STATE_RATE = 500.0  # of joint_states [Hz], as simulated_robot has it by default
-SEED = 0  # of the robot's noise and hidden effects
+SEED = 0  # of the robot's noise and injected effects
 SETTLE = 1.0  # [s] for discovery, which is one-sided
 PATIENCE = 30.0  # [s] beyond the path's own time
 
@@ -185,7 +185,7 @@ def _robot(case: Case) -> list[str]:
     parameters = [f'use_effort:={"false" if case.feedforward == "none" else "true"}',
                   f'seed:={SEED}', 'command_timeout:=0.2']
     if case.hidden:
-        parameters.append(f'hidden_effects:=[{",".join(case.hidden)}]')
+        parameters.append(f'injected_effects:=[{",".join(case.hidden)}]')
     return _command('simulated_robot', parameters)
 
 

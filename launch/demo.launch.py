@@ -4,7 +4,7 @@
 """The closed loop without a robot: simulated_robot, feedforward, monitor and a path.
 
     ros2 launch pprs_dynamics demo.launch.py
-    ros2 launch pprs_dynamics demo.launch.py hidden_effects:="['stribeck_friction']"
+    ros2 launch pprs_dynamics demo.launch.py injected_effects:="['stribeck_friction']"
     ros2 launch pprs_dynamics demo.launch.py model:=/path/share/pprs_dynamics/config/hexapod.yaml
 """
 
@@ -26,7 +26,7 @@ def generate_launch_description() -> LaunchDescription:
         'namespace': ('', 'of the nodes'),
         'rate': ('100.0', 'messages of the path per second'),
         'repeat': ('0', 'how often the path is played; 0: until stopped'),
-        'hidden_effects': ('[]', 'effects that the simulated robot has and the model lacks'),
+        'injected_effects': ('[]', 'effects that the simulated robot has and the model lacks'),
         'diagnose_every': ('0.0', 'seconds between diagnoses of the stream; 0: never'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
         'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
@@ -41,7 +41,8 @@ def generate_launch_description() -> LaunchDescription:
         parameters = [*files, {'use_sim_time': given['use_sim_time']}]
         return [
             Node(executable='simulated_robot', parameters=[*parameters, {
-                'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
+                'injected_effects': ParameterValue(
+                    given['injected_effects'], value_type=list[str])}],
                  **common),
             LifecycleNode(executable='feedforward', name='feedforward', parameters=parameters,
                  remappings=[('~/joint_command', 'simulated_robot/joint_command')], **common),

@@ -54,14 +54,14 @@ PARAMETERS = (
     node_parameter('encoder_resolution', 1e-6, 'step of positions; 0: none [m, rad]', lower=0),
     node_parameter('effort_noise', 0.005, 'standard deviation of the noise (64 % white, 36 % '
                    'coloured) over the largest effort of an excitation [1]', lower=0, upper=1),
-    node_parameter('hidden_effects', (), 'names of effects that the model lacks, or random for a '
+    node_parameter('injected_effects', (), 'names of effects that the model lacks, or random for a '
                    'random one; drives may follow: '
                    'coulomb_friction:lift_1,lift_2'),
-    node_parameter('hidden_scale', 1.0, 'multiplies the strength of hidden effects', lower=0),
-    node_parameter('seed', 0, 'seed of noise and hidden effects', lower=0),
+    node_parameter('injected_scale', 1.0, 'multiplies the strength of injected effects', lower=0),
+    node_parameter('seed', 0, 'seed of noise and injected effects', lower=0),
 )
 # What changes while the robot runs: injected effects, and parameters of ROS 2 itself.
-CHANGEABLE = ('hidden_effects', 'seed', 'hidden_scale')
+CHANGEABLE = ('injected_effects', 'seed', 'injected_scale')
 OF_ROS = ('use_sim_time', 'start_type_description_service')
 # A node that was stopped for longer than this [s], or whose clock was set back by more, goes on
 # from now instead of catching up or waiting.
@@ -98,7 +98,7 @@ class SimulatedRobotNode(Node):
             subscription(self, kind, topic, partial(self._on_command, take))
         self.get_logger().info(
             f'{self._model.title}, {node_values["rate"]:g} Hz, PD loop of '
-            f'{node_values["bandwidth"]:g} Hz, hidden effects: {self._injected()}; holding at home')
+            f'{node_values["bandwidth"]:g} Hz, injected: {self._injected()}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
         # How far the simulation has fallen behind the clock for good, where it could not keep up.
@@ -126,7 +126,7 @@ class SimulatedRobotNode(Node):
         self._injected_effects = values
         self._robot.plant.inject(*(values[name] for name in CHANGEABLE))
         self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
-                               f'hidden effects: {self._injected()}')
+                               f'injected effects: {self._injected()}')
 
     def _injected(self) -> str:
         """Return the injected effects in words."""
@@ -205,7 +205,7 @@ class SimulatedRobotNode(Node):
 
 def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
     """Return the simulated robot of a model with the node's settings."""
-    plant = Plant(model, values['hidden_effects'], values['seed'], values['hidden_scale'],
+    plant = Plant(model, values['injected_effects'], values['seed'], values['injected_scale'],
                   values['rate'])
     control = plant.gains(values['bandwidth'], values['damping_ratio'],
                           gravity_compensation=not values['use_effort'],

@@ -70,7 +70,7 @@ def read_thermometers(time: Array, temperature: Array) -> Array:
 
 
 CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
-STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
+STEEPNESS = 0.005  # of a joint's top speed, within which injected dry friction turns over
 
 
 class InjectedEffectError(PprsError, ValueError):
@@ -146,7 +146,7 @@ class JointMoment:
 
 @dataclass(frozen=True)
 class JointForm:
-    """A hidden force on a joint.
+    """An injected force on a joint.
 
     Parameters
     ----------

@@ -490,7 +490,7 @@ def _link_mass(run: Injecting) -> Injected:
 
 
 def links_that_weigh(model: DriveModel) -> dict[str, tuple[str, ...]]:
-    """Return the links whose mass can be hidden, by name, or raise InjectedEffectError.
+    """Return the links whose mass can be injected, by name, or raise InjectedEffectError.
 
     What turns about an upright axis shows in no weight, and the last link is the payload's.
     """
@@ -859,7 +859,7 @@ def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion
 
 
 def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:
-    """Return the joints that a hidden force can act in along a motion."""
+    """Return the joints that an injected force can act in along a motion."""
     turn, stroke = {**FORMS, **UNKNOWN}[name].needs_turn, np.ptp(motion.position, axis=0)
     return [j for j, unit in enumerate(model.units)
             if not turn or (unit.turns and stroke[j] >= turn)]
@@ -867,7 +867,7 @@ def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:
 
 def one_able_joint(name: str, model: DriveModel, motion: JointMotion,
                    random: np.random.Generator) -> int:
-    """Return one of the joints that a hidden force can act in along a motion."""
+    """Return one of the joints that an injected force can act in along a motion."""
     able = able_joints(name, model, motion)
     if not able:
         raise InjectedEffectError(f'{name} needs a joint that turns by '

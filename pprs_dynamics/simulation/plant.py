@@ -287,10 +287,10 @@ class Plant(Injecting):
         for _ in range(ROUNDS):
             mid = start + ahead * a
             C = np.einsum('kid,k,kie->de', rows, coefficients(rows @ mid), rows)
-            hidden, slope = self._injected(position, mid)
+            injected, slope = self._injected(position, mid)
             # A slope beside M: friction at the middle, linear with the secants of this round.
             damping = C + np.diag(slope)
-            found = np.linalg.solve(M + ahead * damping, push - hidden - damping @ start)
+            found = np.linalg.solve(M + ahead * damping, push - injected - damping @ start)
             if np.all(ahead * np.abs(found - a) <= SOLVED * self._width):
                 break
             # Secants overshoot at a reversal: half of the way, where the velocity turns over.

@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_compare_finds_the_hidden_effects_drive_and_its_size(folder: Path) -> None:
+def test_compare_finds_the_injected_effects_drive_and_its_size(folder: Path) -> None:
     truth = json.loads((folder / 'truth.json').read_text())['effects'][0]['parameters']
     result = json.loads((folder / 'mcap.json').read_text())
     assert set(result['drives']) == set(DRIVES)

@@ -17,7 +17,7 @@ import pytest
 from benchmarks.real import davinci as closed_chain
 from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.fit.arm_fit import fit_arm
+from pprs_dynamics.inference.fit.mechanism_fit import fit_mechanism
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -46,7 +46,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     shutil.copyfile(DATA / 'psm.urdf', folder / 'psm.urdf')
     (folder / 'psm.yaml').write_text(closed_chain.model_text())
     model = DriveModel.load(folder / 'psm.yaml')
-    return fit_arm(model, [part_of(model, closed_chain.FREE)])[0]
+    return fit_mechanism(model, [part_of(model, closed_chain.FREE)])[0]
 
 
 def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: DriveModel) -> None:

@@ -161,7 +161,7 @@ def test_what_only_counts_at_the_start_is_refused_while_the_node_runs(
 
 
 @pytest.mark.parametrize(('node', 'name', 'value'), [
-    (FeedforwardNode, 'window', 0.3), (FeedforwardNode, 'hidden_effects', ['payload_mass']),
+    (FeedforwardNode, 'window', 0.3), (FeedforwardNode, 'injected_effects', ['payload_mass']),
     (MonitorNode, 'command_timeout', 5.0), (MonitorNode, 'timeout_action', 'zero')])
 def test_a_change_for_another_node_is_refused_as_nothing_would_come_of_it(
     node: Any, name: str, value: Any,

@@ -134,17 +134,17 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
         assert robot.bench.spin_until(answer.done)
         return answer.result().results[0]
 
-    assert change('hidden_effects', ['effort_offset:lift_2']).successful
-    assert change('hidden_effects', ['effort_offset:lift_2', 'effort_offset:slide_1']).successful
+    assert change('injected_effects', ['effort_offset:lift_2']).successful
+    assert change('injected_effects', ['effort_offset:lift_2', 'effort_offset:slide_1']).successful
     _, second = robot.node._robot.plant.injected
-    assert change('hidden_effects', ['effort_offset:slide_1']).successful
+    assert change('injected_effects', ['effort_offset:slide_1']).successful
     assert robot.node._robot.plant.injected == [second]
     for name, value, words in (
-        ('hidden_effects', ['friction'], 'cannot be injected'),
-        ('hidden_effects', ['payload_mass:lift_1'], "does not act in 'lift_1'"),
-        ('hidden_effects', ['effort_offset:lift_9'], 'lift_9'),
-        ('hidden_effects', 'effort_offset', 'a list of words'),
-        ('hidden_scale', -1.0, 'at least 0'),
+        ('injected_effects', ['friction'], 'cannot be injected'),
+        ('injected_effects', ['payload_mass:lift_1'], "does not act in 'lift_1'"),
+        ('injected_effects', ['effort_offset:lift_9'], 'lift_9'),
+        ('injected_effects', 'effort_offset', 'a list of words'),
+        ('injected_scale', -1.0, 'at least 0'),
         ('bandwidth', 10.0, 'stay as it was at the start'),
         ('masses.payload', 2.0, 'stay as it was at the start'),
     ):
@@ -153,7 +153,7 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
         assert words in answer.reason
         assert len(answer.reason.splitlines()) == 1
     assert robot.node._robot.plant.injected == [second]
-    assert change('hidden_effects', []).successful
+    assert change('injected_effects', []).successful
     assert robot.node._robot.plant.injected == []
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import Fitted, FittedNumber, fit_arm
+from pprs_dynamics.inference.fit.mechanism_fit import Fitted, FittedNumber, fit_mechanism
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -136,7 +136,7 @@ def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str
 
 def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     if model.is_mechanism or not model_numbers(model):
-        return fit_arm(model, recordings)
+        return fit_mechanism(model, recordings)
     # As in a diagnosis without any effect: the tolerance is the prior, and the width in which
     # friction reverses is free.
     fits = FittedSets(Design.of(model, recordings), DECISIONS)

@@ -37,7 +37,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import base_numbers, base_prior, reconstructed
+from pprs_dynamics.inference.fit.mechanism_fit import base_numbers, base_prior, reconstructed
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
     CarriedOver,

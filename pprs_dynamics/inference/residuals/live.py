@@ -20,7 +20,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 # Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
-ARM_WINDOW = 0.25  # [s]
+MECHANISM_WINDOW = 0.25  # [s]
 ERROR_SPAN = 2.0  # [s] over which the running error is taken
 # Stamps to see before their step is known; more than a late first message or two.
 STAMPS_TO_LEARN = 16
@@ -71,7 +71,7 @@ class LiveComparison:
 
     def __init__(self, model: DriveModel, window: float | None = None, span: float = ERROR_SPAN,
                  ) -> None:
-        self._window = window or (ARM_WINDOW if model.moves_joints else WINDOW)
+        self._window = window or (MECHANISM_WINDOW if model.moves_joints else WINDOW)
         self._span = span
         self._learning: list[tuple[float, ArrayLike, ArrayLike]] = []
         self._live: LiveReconstruction | None = None

@@ -38,8 +38,8 @@ NODE_KEYS = frozenset({
     'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in', 'ahead',
     'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay', 'window',
     'error_span', 'update_rate', 'diagnose_every', 'diagnose_span', 'frame_id',
-    'encoder_resolution', 'effort_noise', 'bandwidth', 'damping_ratio', 'hidden_effects',
-    'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale', 'limit_policy',
+    'encoder_resolution', 'effort_noise', 'bandwidth', 'damping_ratio', 'injected_effects',
+    'injected_scale', 'autostart', 'effort_limits', 'feedforward_scale', 'limit_policy',
     'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning', 'action',
     'controller_timeout', 'demo', 'max_ahead', 'max_duration', 'ramp_time', 'stop_time',
     'feedforward', 'tf_prefix', 'use_sim_time', 'start_type_description_service'})

@@ -82,7 +82,7 @@ Fitted = tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]
 """The fitted model, its numbers, and what the motion does not determine, as sentences."""
 
 
-def fit_arm(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
+def fit_mechanism(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     """Return the model fitted to recordings; its added effects are unchanged.
 
     Of the numbers those of each joint; infinite deviations where the motion does not determine

@@ -20,8 +20,8 @@ from single_axis import axis, axis_recording
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.inference.fit.arm_fit import fit_arm, pseudo_inertia
 from pprs_dynamics.inference.fit.base_fit import fit_base
+from pprs_dynamics.inference.fit.mechanism_fit import fit_mechanism, pseudo_inertia
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.measurement.motion.rests import find_rests
@@ -102,7 +102,7 @@ def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:
     for seed in range(4):
         runs = [arm.record(real, arm.motion(20.0, seed=seed), NOISE, seed)]
         inside += [abs(number.after - arm.FRICTION[number.key][described.drives.index(
-            number.drive)]) < 2.5 * number.std for number in fit_arm(described, runs)[1]
+            number.drive)]) < 2.5 * number.std for number in fit_mechanism(described, runs)[1]
             if number.key in arm.FRICTION]
     assert np.mean(inside) > 0.85
 
