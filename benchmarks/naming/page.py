@@ -27,9 +27,9 @@ from benchmarks.results import write_results
 
 LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysindy', 'mujoco')
 MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
-        'right drives', 'intervals hold')
-ASKED_OF_SOME = ('right drives', 'intervals hold')  # of those that an entrant tells
-TOLD = 4  # entrants whose answers on real machines are printed
+        'right drives', 'interval coverage')
+ASKED_OF_SOME = ('right drives', 'interval coverage')  # of what an entrant names
+MOST_PRINTED = 4  # entrants whose answers on real machines are printed
 LESS_IS_BETTER = ('wrong alone', 'false alarms')
 MARKERS = 'os^vDPX'
 STRENGTHS = ((0.5, 1.0), (2.0,), (5.0, 20.0))  # of the three pictures
@@ -58,12 +58,12 @@ def tables(scored: Mapping[str, Scored]) -> str:
     lines = [*main_table(whole), '',
              *([] if len(whole) == len(best) else [
                  'On the problems that every entrant has answered:', '', *main_table(alike(best)),
-                 '']), better_than_ours(best), '',
+                 '']), *better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
              *(['This package without each of its parts:', '', *main_table(parts), '']
                if any(sort_of(name) == PART for name in parts) else []),
-             *folded('What each fails at', fails_table(best)),
-             *folded('Every figure with its counts, defaults and tuned settings both',
+             *folded('Kinds of wrong answers', fails_table(best)),
+             *folded('Every figure with counts, for default and tuned settings',
                      full_table(scored)),
              *folded('Exact sets of one effect, by its strength', split_table(
                  best, lambda t: f'SNR {t.snr:g}', lambda t, j: j.exact, of=SINGLE))]
@@ -82,18 +82,18 @@ def alike(scored: Mapping[str, Scored]) -> dict[str, Scored]:
 
 
 def of_real_machines(scored: Mapping[str, Scored]) -> str:
-    """Return their table in Markdown, and what the first few entrants said of each recording."""
+    """Return their table in Markdown, and the first entrants' answers for each recording."""
     if not scored:
         return ''
     best = alike({name: scored[name] for name in best_of_settings(scored)})
-    shown = [name for name in best if sort_of(name) != CONTROL][:TOLD]
+    shown = [name for name in best if sort_of(name) != CONTROL][:MOST_PRINTED]
     lines = ['| machine | lacks | ' + ' | '.join(shown) + ' |', '|---' * (len(shown) + 2) + '|']
     for answers in zip(*(best[name] for name in shown), strict=True):
         truth = answers[0][0]
         lines.append(f'| {truth.robot} | {_named(truth.effects)} | '
                      + ' | '.join(_said(answer) for _, answer, _ in answers) + ' |')
-    return '\n'.join(('## Real machines', '', *main_table(best), '', better_than_ours(best), '',
-                      *folded('What was said of each recording', lines)))
+    return '\n'.join(('## Real machines', '', *main_table(best), '', *better_than_ours(best), '',
+                      *folded('Answers for each recording', lines)))
 
 
 def _named(effects: Sequence[Named]) -> str:
@@ -135,12 +135,13 @@ def all_figures(answers: Scored) -> dict[str, Rate]:
             'exact': Rate.of(j.exact for _, _, j in answers), **figures(answers)}
 
 
-def better_than_ours(scored: Mapping[str, Scored]) -> str:
-    """Return a sentence on each figure in which a peer is ahead of this package."""
+def better_than_ours(scored: Mapping[str, Scored]) -> list[str]:
+    """Return a table of the figures in which a peer is ahead of this package."""
     ours = next((name for name in scored if sort_of(name) == OURS), None)
     if ours is None:
-        return ''
-    mine, said = all_figures(scored[ours]), []
+        return []
+    mine = all_figures(scored[ours])
+    lines = ['| figure | this package | better peers |', '|---|---|---|']
     pairs = {name: alike({ours: scored[ours], name: answers}) for name, answers in scored.items()
              if sort_of(name) == PEER}
     rates = {name: tuple(all_figures(pair[entrant]) for entrant in (name, ours))
@@ -150,19 +151,21 @@ def better_than_ours(scored: Mapping[str, Scored]) -> str:
         ahead = [f'{name} ({_cell(its[figure])})' for name, (its, own) in rates.items()
                  if its[figure].count and sign * (its[figure].share - own[figure].share) > 0]
         if ahead:
-            said.append(f'*{figure}* ({_cell(mine[figure])} here): {", ".join(ahead)}')
+            lines.append(f'| {figure} | {_cell(mine[figure])} | {", ".join(ahead)} |')
     faster = [name for name in scored if sort_of(name) == PEER
               and seconds(scored[name]) < seconds(scored[ours])]
     if faster:
-        said.append(f'*time*: {len(faster)} of '
-                    f'{sum(sort_of(name) == PEER for name in scored)}')
-    return 'Peers that are better at something: ' + ('; '.join(said) or 'none') + '.'
+        lines.append(f'| time | {seconds(scored[ours]):.1f} s | {len(faster)} of '
+                     f'{sum(sort_of(name) == PEER for name in scored)} |')
+    return lines
 
 
 def fails_table(scored: Mapping[str, Scored]) -> list[str]:
     """Return how often an answer is wrong in which way."""
-    kinds = ('right', 'the effects and more', 'some of them', 'others', 'silent', 'unknown for '
-             'what has a name', 'a name for the unknown', 'claims of nothing', 'ended in an error')
+    kinds = ('right', 'all effects and others', 'some effects', 'only other effects',
+             'nothing reported', '`unknown`, but in the catalogue',
+             'an effect, but not in the catalogue', 'an effect, but nothing is missing',
+             'ended in an error')
     lines = ['| entrant | ' + ' | '.join(kinds) + ' |', '|---' * (len(kinds) + 1) + '|']
     for name, answers in scored.items():
         found = Counter(_fails(truth, answer, judged) for truth, answer, judged in answers)
@@ -176,26 +179,27 @@ def _fails(truth: Truth, answer: Answer, judged: Judged) -> str:
     if is_right(judged):
         return 'right'
     if truth.kind == 'nothing':
-        return 'claims of nothing'
+        return 'an effect, but nothing is missing'
     if answer.verdict == 'none':
-        return 'silent'
+        return 'nothing reported'
     if truth.kind == 'unknown':
-        return 'a name for the unknown'
+        return 'an effect, but not in the catalogue'
     if answer.verdict == 'unknown':
-        return 'unknown for what has a name'
-    told, true = {effect.name for effect in answer.sets[0]}, set(truth.names)
-    return ('the effects and more' if told > true else 'some of them' if told & true else 'others')
+        return '`unknown`, but in the catalogue'
+    named, true = {effect.name for effect in answer.sets[0]}, set(truth.names)
+    return ('all effects and others' if named > true else 'some effects' if named & true
+            else 'only other effects')
 
 
 def full_table(scored: Mapping[str, Scored]) -> list[str]:
     """Return every figure of every entrant with counts."""
     names = [name for name, *_ in FIGURES]
-    lines = ['| entrant | ' + ' | '.join((*names, 'intervals hold', 'sets', 's')) + ' |',
+    lines = ['| entrant | ' + ' | '.join((*names, 'interval coverage', 'sets', 's')) + ' |',
              '|---' * (len(names) + 4) + '|']
     for entrant in ordered(scored):
         found, size = figures(scored[entrant]), set_size(scored[entrant])
         lines.append(f'| {entrant} | ' + ' | '.join(
-            (*(str(found[name]) for name in names), str(found['intervals hold']),
+            (*(str(found[name]) for name in names), str(found['interval coverage']),
              f'{size:g}' if size else '-', f'{seconds(scored[entrant]):.1f}')) + ' |')
     return lines
 
@@ -292,7 +296,7 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
         axes.set(title='SNR ' + ', '.join(f'{snr:g}' for snr in strengths), xlim=(-3, 103),
                  ylim=(-3, 103), xlabel='claims that are wrong [%]')
         axes.grid(alpha=0.25)
-    panels[0, 0].set_ylabel('one hidden effect, told exactly [%]')
+    panels[0, 0].set_ylabel('one hidden effect, named exactly [%]')
     panels[0, -1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
     figure.savefig(picture, dpi=100)
     plt.close(figure)

@@ -142,7 +142,7 @@ def figures(scored: Scored) -> dict[str, Rate]:
     """Return each figure of an entrant."""
     found = {name: Rate.of(asked(judged) for truth, _, judged in scored if chosen(truth))
              for name, chosen, asked, _ in FIGURES}
-    found['intervals hold'] = Rate.of(hit for _, _, judged in scored for hit in judged.covered)
+    found['interval coverage'] = Rate.of(hit for _, _, judged in scored for hit in judged.covered)
     return found
 
 

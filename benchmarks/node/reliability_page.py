@@ -27,19 +27,19 @@ def _fuzz(found: dict[str, Any]) -> str:
             f'Answers to a known pose that were wrong after damage: '
             f'{found["wrong_answers_after_damage"]}. Node alive at the end: {found["alive"]}. '
             f'Resident memory grew by {found["memory_growth_mb"]:.0f} MB, in steps with the '
-            'messages of 10 000 points (1.8 MB, one in 5000) among bursts of others. What keeps '
-            'it has not been found: without these 100 000 messages make it grow by 1.6 MB, and a '
-            'stream of nothing but these, valid or damaged, by 18 to 32 MB, all of it with the '
-            'first forty.\n')
+            'messages of 10 000 points (1.8 MB, one in 5000) among bursts of others. The owner '
+            'of this memory is not known. Without these messages it grows by 1.6 MB in 100 000. A '
+            'stream of these alone, valid or damaged, adds 18 to 32 MB, all with the first '
+            'forty.\n')
 
 
 def _storm(found: dict[str, Any]) -> str:
     return (f'{found["sets"]:,} sets of random parameters while streaming, '
-            f'{found["accepted"]:,} of them accepted. Accepted though no model file may hold them: '
-            f'{found["wrongly_accepted"]}; refused though one may: {found["wrongly_refused"]}; '
-            f'without a reason: {found["refused_without_reason"]}. Of {found["answers"]:,} '
-            f'answers, {found["wrong_answers"]} were not those of the model that the accepted '
-            'ones make.\n')
+            f'{found["accepted"]:,} of them accepted. Accepted, but not allowed in a model file: '
+            f'{found["wrongly_accepted"]}; allowed, but refused: {found["wrongly_refused"]}; '
+            f'refused without a reason: {found["refused_without_reason"]}. Of '
+            f'{found["answers"]:,} answers, {found["wrong_answers"]} were not those of the '
+            'accepted model.\n')
 
 
 def _stall(found: dict[str, Any]) -> str:
@@ -52,8 +52,8 @@ def _stall(found: dict[str, Any]) -> str:
         'platform that rises at 15 mm/s, and continued. Commands of the 0.3 s after that:', '',
         '| messages | sent | commands | setpoints older than 0.1 s | oldest setpoint | '
         'farthest from the path | rejected, `TIME` | passed over for later ones |',
-        '|---|---|---|---|---|---|---|---|', *rows, '')) + '\nThe drives hold the pose of the '
-        'stop, with its gravity, until the first command.\n')
+        '|---|---|---|---|---|---|---|---|', *rows, '')) + '\nUntil the first command the drives '
+        'remain at the pose of the stop, with its gravity.\n')
 
 
 def _soak(found: dict[str, Any]) -> str:

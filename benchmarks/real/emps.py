@@ -171,17 +171,18 @@ def document(story: Story) -> str:
     for name, model in rows:
         figures = [f(model, recording) for f in (error_of, compared) for recording in (run, pulses)]
         lines.append(f'| {name} | ' + ' | '.join(f'{figure:.2f} %' for figure in figures) + ' |')
-    lines += ['', f'- Gated by blocks of the identification run: {_ending(story.blind)}',
-              f'- Gated by the pulses run: {_ending(story.gated)}']
+    lines += ['', *_ending('blocks of the identification run', story.blind),
+              *_ending('the pulses run', story.gated)]
     if story.ripple is not None:
         lines.append(f'- A force_ripple asked for in the last model: '
                      f'{"taken" if story.ripple.adopted else "refused"}: {story.ripple.reason}.')
     return '\n'.join(lines)
 
 
-def _ending(outcome: AdoptionRun) -> str:
+def _ending(name: str, outcome: AdoptionRun) -> list[str]:
     steps = ', '.join(step.effect for step in outcome.adopted) or 'nothing'
-    return f'{steps} adopted; ended {outcome.ended}: {outcome.reason}.'
+    return [f'- Gated by {name}: adopted {steps}; ended {outcome.ended}.',
+            *(f'  - {reason}.' for reason in outcome.reason.split('; '))]
 
 
 def draw(story: Story, path: Path) -> None:

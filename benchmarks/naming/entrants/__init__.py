@@ -130,7 +130,7 @@ ENTRANTS: dict[str, Entrant] = {
     'pprs diagnose': Entrant(pprs, library='pprs_dynamics', sort=OURS),
     **_with_tuned(PEERS),
     'pprs, noise white': Entrant(white_noise, sort=PART),
-    'pprs, no prices': Entrant(without_prices, sort=PART),
+    'pprs, no prior penalties': Entrant(without_prices, sort=PART),
     'pprs, greedy': Entrant(greedy, sort=PART),
     'pprs, columns of the given model': Entrant(given_model, sort=PART),
     'silent': Entrant(silent, sort=CONTROL),
