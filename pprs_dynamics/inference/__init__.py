@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a model lacks: regression, search, diagnosis, adoption, and the next experiment."""
+"""Inference: regression, search, diagnosis, adoption, and the next experiment."""

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What was measured: files of recordings, and the smoothed motion of the drives."""
+"""Measurement: files of recordings, and the smoothed motion of the drives."""

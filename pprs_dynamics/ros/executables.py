@@ -57,7 +57,7 @@ def _run(module: str, node: str, has_actions: bool = False) -> int:
 
 
 def _check_arguments(name: str, arguments: list[str]) -> None:
-    """Exit where something is asked for, is not for ROS 2, or is a file that cannot be read.
+    """Exit for --help, for arguments outside of --ros-args, and for unreadable files.
 
     ROS 2 passes over what stands outside of --ros-args: a model given there would not be used.
     """

@@ -274,7 +274,7 @@ class FeedforwardNode(ManagedNode):
 
     @property
     def _controller_fault(self) -> str:
-        """That the controller of `~/joint_trajectory` does not follow; '' where none is known."""
+        """Fault of the controller of `~/joint_trajectory`; '' where none is known."""
         if not self._joint_trajectory.get_subscription_count() or not (
                 self._controller.was_heard
                 or self.count_publishers(self._controller_topic)):

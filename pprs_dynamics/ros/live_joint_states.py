@@ -133,7 +133,7 @@ class LiveJointStates(Node):
 
     @property
     def model(self) -> DriveModel:
-        """What is compared with."""
+        """Model in force, with which efforts are compared."""
         return self.stream.model
 
     def _take(self, stamp: int, position: Any, effort: Any) -> None:

@@ -131,7 +131,7 @@ class LiveStream:
             self.comparison.push((stamp - self.origin) / NANOSECONDS, position, effort)
 
     def compare(self) -> Compared | None:
-        """Return what became comparable since the last call; None: nothing did."""
+        """Return the samples compared since the last call; None for none."""
         try:
             with self.lock:
                 if self._begins_anew:

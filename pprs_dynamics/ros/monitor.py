@@ -273,7 +273,7 @@ class MonitorNode(ManagedNode):
         self._status.content.compared_share = round(self._share, 3)
 
     def _diagnose(self) -> None:
-        """Pass on what the worker has found, and give it the next window."""
+        """Publish the worker's diagnosis, and submit the next window."""
         if self.state != 'active':
             return
         if (answer := self._worker.poll()) is not None:
@@ -292,7 +292,7 @@ class MonitorNode(ManagedNode):
                                 tuple(self._settings.node_values['diagnose_since']))
 
     def _to_adopt(self) -> dict[str, Any]:
-        """Return what a person may adopt now, or raise PprsError."""
+        """Return the model values that may be adopted now, or raise PprsError."""
         if self._diagnosed.values != self._settings.model.values:
             raise NotSetError('the latest window was diagnosed against another model than is '
                               'in force')

@@ -248,7 +248,7 @@ class TrajectoryProxyNode(Node):
 
 
 def _duration(goal: Any, now: int) -> float:
-    """Return how long a goal's motion takes from a moment [ns] on, in which it is sent [s]."""
+    """Return the duration of a goal's motion [s] if it is sent at a time [ns]."""
     start = conversions.nanoseconds(goal.trajectory.header.stamp) or now
     end = start + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
     return (end - now) / conversions.NANOSECONDS

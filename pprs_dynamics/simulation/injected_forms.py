@@ -58,7 +58,7 @@ def thinner(temperature: Array, reference: Array | float) -> Array:
 
 
 def read_thermometers(time: Array, temperature: Array) -> Array:
-    """Return what thermometers of drives say, (N, D) [degC]; NaN between their readings."""
+    """Return temperatures of the drives, (N, D) [degC]; NaN between two readings."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     late, read = np.empty_like(temperature), np.full(temperature.shape, np.nan)
     late[0] = temperature[0]

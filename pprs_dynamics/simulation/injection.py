@@ -340,7 +340,7 @@ class Injection(Injecting):
 
     @property
     def beside(self) -> Array:
-        """By how much encoders lead their links, (N, D)."""
+        """Lead of the encoders before their links, (N, D)."""
         return self.lead + self.shift + self.windup
 
     @property

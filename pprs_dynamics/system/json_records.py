@@ -52,7 +52,7 @@ class JsonRecord:
 
 
 def for_json(content: Any) -> Any:
-    """Return what JSON can contain: text as `displayed`, None for numbers that are not finite.
+    """Return a value for JSON: text as `displayed`, None for numbers that are not finite.
 
     Objects with a method `to_dict` and dataclasses become dictionaries.
     """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How wrong a model is on recordings, and where."""
+"""Comparison of a model with recordings: its error, and where it is largest."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class ComparisonResult(Result):
 
     @property
     def verdict(self) -> str:
-        """How good the model is, in one sentence."""
+        """Error and grade of the model, in at most two sentences."""
         return self.comparison.verdict
 
     @property
@@ -95,7 +95,7 @@ class ComparisonResult(Result):
             for name, drive in comparison.drives.items()]
 
     def view(self) -> Any:
-        """Return how wrong the model is, where, and what to do next, for the terminal."""
+        """Return errors, places and the next step for the terminal."""
         headings, rows = self._drives()
         table = text_table(headings[:-1], [
             (f'[{COLOURS[row[-1]]}]{escape(row[0])}[/]', *row[1:-1]) for row in rows],
@@ -218,7 +218,7 @@ class ComparisonResult(Result):
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
             progress: Progress | None = None, as_it_is: bool = False) -> ComparisonResult:
-    """Hold a model against recordings: how wrong it is, on which drive, in which situations.
+    """Compare a model with recordings: its error, on which drive, in which situations.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which physical effect a model lacks."""
+"""Diagnosis: the physical effects that a model lacks."""
 
 from __future__ import annotations
 
@@ -373,7 +373,7 @@ class DiagnosisResult(Result):
 
     @property
     def effects(self) -> tuple[FoundEffect, ...]:
-        """What is missing, in the order of adoption."""
+        """Reported effects, in the order of adoption."""
         return self.diagnosis.effects
 
     @property
@@ -382,7 +382,7 @@ class DiagnosisResult(Result):
         return self.diagnosis.adopted
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:
-        """Return what the terminal shows, with the command to go on with, or without."""
+        """Return the diagnosis for the terminal, with or without the next command."""
         return diagnosis_view(self.diagnosis, self._words, details, next_step)
 
     def page(self) -> Page:

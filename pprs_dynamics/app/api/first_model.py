@@ -514,7 +514,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
 
 def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: float | None,
                     movable: Sequence[str]) -> Guess:
-    """Return which columns are what in files of one quantity each."""
+    """Return the reading of columns in files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
     guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
                for kind, file in inside.items() if kind != FILE_TIME}

@@ -70,7 +70,7 @@ class FitResult(Result):
 
     @property
     def _headline(self) -> str:
-        """That the model explains little of the efforts; '' where it explains enough."""
+        """Warning that the model explains little of the efforts; '' where it explains enough."""
         return f'{word_little(self.fit.little)}, fitted nevertheless' if self.fit.little else ''
 
     @property

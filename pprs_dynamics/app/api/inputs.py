@@ -208,7 +208,7 @@ class Inputs:
 
     @property
     def fitted_to(self) -> tuple[str, ...]:
-        """Those of the recordings that the model was fitted to, by what its file says."""
+        """Recordings that the model was fitted to, by the hashes in its file."""
         hashes = {file.sha256 for file in reference_files(self.model.values, self.model.source)}
         return tuple(displayed(name) for name in self.recordings
                      if hashes and name in self.paths and fingerprint(name) in hashes)
@@ -261,7 +261,7 @@ class Inputs:
 
     @property
     def ledger(self) -> LedgerBook:
-        """What enters adoptions on these recordings into a model's ledger."""
+        """Ledger that enters adoptions on these recordings into a model."""
         from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:

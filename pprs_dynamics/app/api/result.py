@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every result can do: say itself in text, HTML, JSON, tables and a picture."""
+"""Base class of results: text, HTML, JSON, tables and a picture."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Result(JsonRecord, ABC):
 
     @abstractmethod
     def view(self) -> Any:
-        """Return what the terminal shows, for rich's console.
+        """Return the result for rich's console.
 
         Raises
         ------
@@ -59,7 +59,7 @@ class Result(JsonRecord, ABC):
 
     @abstractmethod
     def page(self) -> Page:
-        """Return what the command writes with --report.
+        """Return the page that the command writes with --report.
 
         Raises
         ------
@@ -88,7 +88,7 @@ class Result(JsonRecord, ABC):
         return page.write(path)
 
     def record(self, command: str = '') -> list[tuple[str, str]]:
-        """Return what a result is of: date, version, command, model and recordings with hashes."""
+        """Return the record of a result: date, version, command, hashes of model and recordings."""
         found = [('date', datetime.now(UTC).isoformat(timespec='seconds')),
                  ('version', f'pprs_dynamics {__version__}'), ('command', command)]
         if (inputs := getattr(self, 'inputs', None)) is not None:

@@ -76,7 +76,7 @@ class SimulationResult(Result):
         return len(self.recording.time)
 
     def view(self) -> Any:
-        """Return what the terminal shows; the injected effects are not shown."""
+        """Return the number of samples and of hidden effects, for the terminal."""
         return (f'{self.samples} samples at {self.rate:g} Hz, '
                 f'{counted(len(self.effects), "effect")} hidden')
 
@@ -101,7 +101,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
              motion: PlatformMotion | None = None, duration: float = 40.0,
              path_seed: int = 0, noise: float | None = None,
              progress: Progress | None = None) -> SimulationResult:
-    """Record a robot of a physics engine that has effects which its model does not know of.
+    """Record a simulated robot with effects that its model lacks.
 
     Parameters
     ----------

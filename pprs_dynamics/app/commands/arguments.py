@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What commands read, print and write: arguments with their checks, recordings, results.
+"""Arguments of commands with their checks; reading recordings, printing and writing results.
 
 argparse turns the errors of checks into one line and status 2. Files are written whole or not.
 """

@@ -51,7 +51,7 @@ class MechanismJson(TypedDict):
 
 
 class InfoJson(TypedDict):
-    """What recordings and a robot contain.
+    """Contents of recordings and of a robot.
 
     Parameters
     ----------

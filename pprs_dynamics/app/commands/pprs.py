@@ -136,7 +136,7 @@ def _print_error(sentence: str, given: Sequence[str]) -> None:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """Say a library's warning in one line, without the place in our code where it arose."""
+    """Print a library's warning in one line, without its place in our code."""
     print(f'pprs: warning: {" ".join(str(message).split())}', file=sys.stderr)
 
 

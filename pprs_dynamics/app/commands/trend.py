@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def fleet_page(fleet: FleetTrends) -> Page:
-    """Return the page."""
+    """Return the page of all changes, with a figure of each quantity."""
     changed = fleet.changes
     count = len({trend.robot for trend in changed})
     page = Page(f'Fleet: {count} of {len(fleet.robots)} robots changed')

@@ -67,7 +67,7 @@ class SurveyJob:
 
     @property
     def common(self) -> dict[str, Any]:
-        """What all rows of the recording have; '' as hash of one that cannot be read."""
+        """Columns that all rows of the recording share; hash '' for one that cannot be read."""
         path = Path(self.entry.path)
         try:
             content = fingerprint(path)

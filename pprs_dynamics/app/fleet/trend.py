@@ -117,7 +117,7 @@ class FleetTrends(JsonRecord):
 
     @property
     def text(self) -> list[str]:
-        """What changed, one sentence for each quantity."""
+        """Changes, one sentence for each quantity."""
         sentences = ([trend.text for trend in self.changes]
                      or [f'No change on {counted(len(self.robots), "robot")}.'])
         if self.refused:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the Plotly figures of all pages share: colours, layout, lines, rows, thinned samples."""
+"""Common parts of Plotly figures: colours, layout, lines, rows, thinned samples."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def deviations(values: Array) -> dict[str, Any]:
 
 
 def hover(units: DriveUnits) -> str:
-    """Return what the cursor shows of an effort."""
+    """Return the template of the cursor's text for an effort."""
     return f'%{{y:.3f}} {units.effort}'
 
 

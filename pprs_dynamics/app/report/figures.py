@@ -102,7 +102,7 @@ def curve_with_band(answer: Adoption) -> Any:
 
 
 def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:
-    """Return what each effect contributes to each drive over time.
+    """Return a figure of each effect's contribution to each drive over time.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:
 
 def add_contributions(page: Page, residuals: Residuals, forces: dict[str, Any], caption: str,
                       ) -> None:
-    """Add what each effect contributes, on the drive that is chosen."""
+    """Add the contributions of effects on the drive that is chosen in a menu."""
     size = sum(np.mean(force ** 2, axis=0) for force in forces.values())
     acting = [name for d, name in enumerate(residuals.drives) if size[d] > 0]
     page.menu('Drive', acting, residuals.drives[int(np.argmax(size))])

@@ -26,7 +26,7 @@ def history_view(steps: Sequence[Step], unit: str = 'N') -> Any:
 
 
 def details(step: Step) -> list[str]:
-    """Return what a step was made from, in sentences."""
+    """Return values, recordings and remarks of a step, in sentences."""
     values = [f'{name} = {with_uncertainty(value, inf if std >= NOT_KNOWN else std, unit)}'
               for name, value, std, unit in zip(step.parameters, step.values, step.std,
                                                 step.units, strict=False) if value]

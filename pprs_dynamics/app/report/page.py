@@ -94,20 +94,20 @@ class Page:
         self._body.append(f'<p class="{kind}">{escape(text)}</p>')
 
     def sources(self, model: str, recordings: Iterable[str], held_out: Sequence[str] = ()) -> None:
-        """Say which model and which recordings it is about."""
+        """Add the names of the model and of the recordings."""
         held = f' Held out: {", ".join(held_out)}.' if held_out else ''
         self.text(f'Model: {Path(model).name or "built in memory"}. Recordings: '
                   f'{", ".join(recordings)}.{held}', 'note')
 
     def command(self, text: str, command: str) -> None:
-        """Add what to do next, with a command that can be copied."""
+        """Add the next step, with a command that can be copied."""
         code = (f'<div class="command"><code>{escape(command)}</code>'
                 '<button type="button">Copy</button></div>') if command else ''
         self._body.append(f'<section class="next" aria-label="Next step"><p><b>Next:</b> '
                           f'{escape(text)}{":" if command else "."}</p>{code}</section>')
 
     def record(self, lines: Iterable[tuple[str, str]]) -> None:
-        """Add what the page is of, so that it can be filed: labelled lines behind a title."""
+        """Add the record of the page: labelled lines behind a title."""
         self.heading('Record')
         with self.fold('Date, version, command and files'):
             self._body.append(f'<dl class="record">{_terms(lines)}</dl>')
@@ -203,7 +203,7 @@ class Page:
                 + f'{_data(f"{name}-data", data)}</figure>')
 
     def html(self) -> str:
-        """Return the page."""
+        """Return the page as HTML with its styles, scripts and data."""
         library = ''
         if self._figures:
             packed = files('pprs_dynamics.app.report').joinpath(BASIC).read_bytes()

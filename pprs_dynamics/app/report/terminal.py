@@ -57,7 +57,7 @@ def stacked(*parts: Any) -> Any:
 
 
 def as_text(view: Any, width: int) -> str:
-    """Return what the terminal would show, without colours."""
+    """Return a view as text, without colours."""
     screen = console(force_jupyter=False, width=width)
     with screen.capture() as captured:
         screen.print(view)
@@ -65,7 +65,7 @@ def as_text(view: Any, width: int) -> str:
 
 
 def as_html(view: Any, width: int) -> str:
-    """Return what the terminal would show as HTML, with its colours."""
+    """Return a view as HTML, with its colours."""
     # In a notebook rich would show it at once, too.
     screen = console(record=True, width=width, file=io.StringIO(), force_jupyter=False)
     screen.print(view)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is drawn of the recordings: marked samples, scatter plots, the robot in motion."""
+"""Marked samples, scatter plots and the robot's motion, as the workbench draws them."""
 
 from __future__ import annotations
 

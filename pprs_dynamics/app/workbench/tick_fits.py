@@ -55,7 +55,7 @@ class Tick:
 
     @property
     def effect(self) -> type[CatalogueEffect]:
-        """What it is a tick of."""
+        """Ticked effect."""
         return self.best.effect
 
 
@@ -79,7 +79,7 @@ class Offer:
 
 
 class TickFits:
-    """Everything that ticks are answered from, for one model.
+    """Fits of one model that answer ticks.
 
     Parameters
     ----------

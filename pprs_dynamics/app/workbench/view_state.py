@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is shown of one set of ticks: fit, errors, values, evidence; and how it comes, in stages.
+"""State of the view of a set of ticks: fit, errors, values and evidence, in stages.
 
 Linear at once, then noise, shapes and the exact model.
 """
@@ -45,7 +45,7 @@ class DriveError:
 
 @dataclass(frozen=True)
 class Share:
-    """What an unticked effect explains of the squared error in a mask.
+    """Share of the squared error in a mask that an unticked effect explains.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class ViewState:
 
     @property
     def departure(self) -> float:
-        """By how much the cost is above that of the best values."""
+        """Cost above that of the best values."""
         return max(self.found.total - self.free.total, 0.0)
 
     @property
@@ -143,7 +143,7 @@ def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision:
 
 
 def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
-    """Yield what follows: the noise fitted, what others would gain, shapes, the model itself."""
+    """Yield the later stages: fitted noise, gains of other effects, shapes, exact model."""
     free = fits.fits.evaluate(tuple(tick.best for tick in view.ticks.values()))
     view = _fitted(fits, view, free, FITTED)
     yield view
@@ -189,7 +189,7 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
 
 def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], fits: TickFits,
                    called_for: Set[str] | None) -> dict[str, Any]:
-    """Return all that is shown of one effect.
+    """Return the state of one effect, for JSON.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ class _Case:
 
     @property
     def held_out(self) -> str:
-        """What decides, for a sentence."""
+        """Name of the held-out data, for a sentence."""
         return ('the validation recordings' if self.validate
                 else 'held-out blocks of the recordings')
 

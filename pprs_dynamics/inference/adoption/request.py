@@ -103,7 +103,7 @@ class EffectRequest:
 
     @property
     def name(self) -> str:
-        """Of the effect, as in results and ledgers."""
+        """Name of the effect, as in results and ledgers."""
         return f'{self.effect.name}:{self.drive}@{self.variable}' if (
             self.variable) else self.effect.name
 

@@ -48,7 +48,7 @@ PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
 
 @dataclass(frozen=True)
 class Localisation:
-    """Where the error lies, and the noise of the drives.
+    """Patterns of the error, and the noise of the drives.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class DriveComparison(JsonRecord):
 
     @property
     def grade(self) -> str:
-        """How good the model is: 'noise', 'good', 'fair' or 'poor'."""
+        """Grade of the model: 'noise', 'good', 'fair' or 'poor'."""
         # Below the uncertainty of the noise nothing can be attributed to the model.
         least = np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1) * (self.noise_floor or 0.0)
         if self.is_little:

@@ -27,7 +27,7 @@ def diagnose(
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
-    """Return which physical effect a model lacks, as far as recordings show it.
+    """Return the diagnosis of a model on recordings: the effects that it lacks.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made from memory
 
 def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = None,
                ) -> tuple[str, str]:
-    """Return what to do first where a model explains little, and the command.
+    """Return the first step where a model explains little, and its command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
 
@@ -123,7 +123,7 @@ def _has_no_friction(model: DriveModel) -> bool:
 
 
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
-    """Return what to do where efforts are no measurement, and the command that ignores this."""
+    """Return the next step where efforts are no measurement, and the command that ignores this."""
     lines = list(dict.fromkeys(finding.line for finding in findings if finding.line))
     if all(finding.kind == MOUNTING for finding in findings):
         return (f'Write {listed(lines)} into the model file. If the robot is mounted as in the '
@@ -134,7 +134,7 @@ def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple
 
 
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
-    """Return what to do next, and the command for it."""
+    """Return the next step, and its command."""
     other = replace(files, recordings=(SECOND,)).command('diagnose')
     both = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     effects, is_change = diagnosis.effects, diagnosis.since is not None

@@ -287,7 +287,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:
-    """Return what a reference run covers and explains; nothing without one."""
+    """Return the shares that a reference run covers and explains; nothing without one."""
     if since is None:
         return ()
     shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()
@@ -355,7 +355,7 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
-    """Return which effects the model lacks, and which of its values the data contradict."""
+    """Return the sentence on missing effects and on values that the data contradict."""
     new = []
     for effect in diagnosis.effects:
         if not effect.in_model:

@@ -104,7 +104,7 @@ class MotionLimits:
         return found
 
     def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
-        """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
+        """Return the share of each limit, less a margin, that a motion uses."""
         state, left = forces.mechanism, 1 - self.margin
         shares = self._of_drives(model, state.position, state.velocity, state.acceleration)
         shares['effort'] = (np.abs(forces.total) + self.effort_reserve) / (

@@ -77,7 +77,7 @@ class ExpectedEvidence:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How well a number would be known.
+    """Standard deviations of a number before and after an experiment.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class Experiment(JsonRecord):
 
     @property
     def text(self) -> str:
-        """What it is for, and whether it will do, in a few sentences."""
+        """Purpose and expected evidence, in a few sentences."""
         if self.determined is not None:
             return ('This motion measures the numbers of the model and of common effects. It '
                     f'determines {self.determined} of {self.total} combinations better '

@@ -95,7 +95,7 @@ class FittedTerm:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Of the fitted columns: coefficients, then shape parameters."""
+        """Parameters of the fitted columns: coefficients, then shape parameters."""
         effect, known = self.component.effect, self.component.effect.coefficients
         return (*(c for name in self.component.names for c in known if c.name == name),
                 *effect.shape)
@@ -232,7 +232,7 @@ class Information:
 
 
 def _key(column: BaseColumn) -> str:
-    """Return what identifies a base column in any design."""
+    """Return the key of a base column, the same in any design."""
     return repr(replace(column, rows={}))
 
 
@@ -332,7 +332,7 @@ def solve(matrix: Array, side: Array) -> Array:
 
 @dataclass(frozen=True)
 class Question:
-    """What a motion is designed to decide.
+    """Rival sets and uncertain effects that a motion is designed to decide.
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ class Question:
 
     @property
     def precision(self) -> Precision:
-        """How well the effects in question are known, of a new robot with its model's numbers."""
+        """Precision of the uncertain effects, for a new robot with its model's numbers."""
         terms = [term for subject in self.subjects for term in subject]
         numbers = self.information.numbers if self.kind == COMMISSION else ()
         return precision_of(self.information, terms, numbers)
@@ -393,7 +393,7 @@ def precision_of(information: Information, terms: Sequence[FittedTerm],
 
 def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
                 progress: Callable[[float], None]) -> Question:
-    """Return what recordings leave open; errors as `diagnose`."""
+    """Return the rivals and uncertain effects after recordings; errors as `diagnose`."""
     table = tabulate(model, recordings, DECISIONS, progress)
     rivals = table.rivals(DECISIONS.rival_margin)
     if rivals:

@@ -216,7 +216,7 @@ def _numbers(model: DriveModel, fitted: DriveModel, std: Mapping[str, Array],
 
 def _notes(model: DriveModel, fitted: DriveModel, links: Array, masses: Array, still: Array,
            ) -> tuple[str, ...]:
-    """Return what the motion determines.
+    """Return notes on the parameters that the motion determines.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those tha
 
 @dataclass(frozen=True)
 class States:
-    """Where drives are and which way they move, in lengths over which forces are alike.
+    """Positions and directions of drives, in units of correlation lengths of the error.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Process:
     @classmethod
     def of(cls, residuals: Residuals, states: States, drive: int | None = None,
            ) -> tuple[Process, Array]:
-        """Return that of a recording, and its features there, (M, R)."""
+        """Return the process of a recording, and its features there, (M, R)."""
         at = states.at(*motion_of(residuals), drive)
         rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
         return cls(drive, states, at[rows], factor[rows]), factor
@@ -204,7 +204,7 @@ class Waves:
 
     @classmethod
     def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
-        """Return those that a drive's residual, (M,), shows.
+        """Return the waves in a drive's residual, (M,).
 
         The strongest first, each with those before it.
         """
@@ -326,12 +326,12 @@ class Reference:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the recordings."""
+        """Names of the recordings."""
         return tuple(recording.name for recording in self.recordings)
 
     @property
     def note(self) -> str:
-        """What must be known of it: whether its errors repeat; '' for nothing."""
+        """Warning that the errors of the runs hardly repeat; '' for none."""
         if np.max(self.repeats) < LEAST_REPEATS:
             return (f'the error of {", ".join(self.names)} does not repeat: of the reference only '
                     'the numbers of the base are used')
@@ -502,7 +502,7 @@ def _sized(residuals: Residuals, columns: Array, d: int, features: Sequence[Arra
 
 
 def _parts(residuals: Residuals) -> Integers:
-    """Return which run each sample is of; of a single one, which block of it."""
+    """Return the run of each sample; for a single run the block."""
     return residuals.record if residuals.record[-1] else residuals.blocks(BLOCKS)
 
 

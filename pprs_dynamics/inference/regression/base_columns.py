@@ -70,7 +70,7 @@ class ModelNumber(BaseColumn):
 
 @dataclass(frozen=True)
 class FrictionForm(BaseColumn):
-    """What the model's friction may do otherwise without another number."""
+    """Other form of the model's friction, with the same numbers."""
 
     in_model = False
 
@@ -136,7 +136,7 @@ class PresentParameter(BaseColumn):
 
 def force_of(base: Sequence[BaseColumn], coefficients: Array, shape: tuple[int, ...],
              of: Callable[[BaseColumn], bool]) -> Array:
-    """Return what some base columns add to the forces with coefficients, in the shape (M, D) [N].
+    """Return the force of base columns with coefficients, (M, D) [N].
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, f
 
 def present_columns(effect: CatalogueEffect, known: Mapping[str, float],
                     ) -> Iterator[PresentParameter]:
-    """Yield what of an effect of the given model is uncertain, as columns without rows.
+    """Yield the uncertain parameters of an effect of the input model, as columns without rows.
 
     Parameters
     ----------

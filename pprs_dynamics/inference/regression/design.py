@@ -165,7 +165,7 @@ class Design:
         return design
 
     def _drop_unknown_past(self) -> None:
-        """Drop efforts that are of motion before or after their segment.
+        """Drop efforts that a delay moves into a segment from motion outside of it.
 
         If the efforts are late, those at the start of a segment are of a motion that is not known.
         """
@@ -275,7 +275,7 @@ class Design:
         return self._exact[key]
 
     def carried_forces(self, coefficients: Array) -> Array:
-        """Return what the directions of a reference add to the forces, (M, D) [N].
+        """Return the force of a reference's directions with coefficients, (M, D) [N].
 
         Parameters
         ----------
@@ -430,7 +430,7 @@ class Design:
 
     @cached_property
     def covered(self) -> tuple[DriveRange, ...]:
-        """What each drive did."""
+        """Ranges of motion of each drive."""
         return tuple(drive_range(self.given, self.recordings, drive)
                      for drive in range(len(self.drives)))
 
@@ -525,7 +525,7 @@ class Design:
 
     def _misread_rows(self, effect: type[MeasurementEffect], drive: int,
                       shape: Mapping[str, float]) -> dict[int, Array]:
-        """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
+        """Return changes of all efforts by a position error of one drive, (k, M) by drive.
 
         The force is not in proportion to a play. Around a model that has the effect it is taken
         at steps of `SHARE` of its size. Else, for coefficients in `not_linear_in`, it is taken at

@@ -54,7 +54,7 @@ class Block:
 
     @cached_property
     def log_det(self) -> float:
-        """Of the precision."""
+        """Logarithm of the determinant of the precision."""
         return float(np.linalg.slogdet(self.precision)[1])
 
 
@@ -175,7 +175,7 @@ class Prior:
         return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det, beyond)
 
     def _both_sides(self, away: Array, variance: Array, beyond: Array) -> float:
-        """Return what -2 ln of the integral over numbers with a tolerance has more.
+        """Return the correction of -2 ln of the integral for numbers with a tolerance.
 
         The prior of such a number is one Gaussian within its tolerance and a narrower one beyond,
         so that its posterior is, too. The determinant is that of the side on which its mode lies,

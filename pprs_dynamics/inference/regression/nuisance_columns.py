@@ -35,7 +35,7 @@ TURNS_OVER = 0.002
 
 
 def reversal_rows(design: Design, term: Term, units: Array) -> Array:
-    """Return what a term's friction changes by if it reverses in other widths, (u, w, M) [N].
+    """Return changes of a term's friction by other widths of reversal, (u, w, M) [N].
 
     None, (u, 0, M), for an effect that is no friction.
 
@@ -65,7 +65,7 @@ def reversal_rows(design: Design, term: Term, units: Array) -> Array:
 
 
 def deviation_rows(design: Design, term: Term, units: Array) -> Array:
-    """Return what real forms of a term's effect may add to its force, (u, w, M) [N].
+    """Return departures of real forms from a term's law, (u, w, M) [N].
 
     See `reversal_rows`.
     """
@@ -101,7 +101,7 @@ def _treated(design: Design, count: int, rows: Callable[[FullRate], Sequence[Arr
 
 
 def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dict[int, Array]:
-    """Return what friction in passive joints changes by where it turns over otherwise, by drive.
+    """Return changes of passive friction by other widths of reversal, by drive.
 
     By units of coefficients k and widths w, (k, w, M) [N] each; {} for what is no such friction.
     """

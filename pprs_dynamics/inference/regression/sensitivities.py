@@ -211,7 +211,7 @@ class Sensitivities:
         return columns
 
     def _under_friction(self, friction: ModelJointFriction, state: Any) -> list[Array]:
-        """Return what friction changes if it follows the loads that friction adds, (N, D) [N]."""
+        """Return the friction by loads that friction itself adds, (N, D) [N]."""
         load = state.robot.load_of_friction(state, friction.table(state.robot, state.reversal))
         if load is None:
             return []
@@ -444,7 +444,7 @@ def following(model: DriveModel) -> list[Effect]:
 
 def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Array,
                      even: Array | float = 0.0) -> list[Array]:
-    """Return what dry friction that turns over otherwise changes, (N, D) each.
+    """Return changes of dry friction by another width of reversal, (N, D) each.
 
     Parameters
     ----------
@@ -469,7 +469,7 @@ def reversal_columns(dry: Array, velocity: Array, direction: Array, widths: Arra
 
 
 def passive_reversal_columns(friction: Effect, state: Any) -> Array:
-    """Return what friction in passive joints that turns over otherwise changes, (W, N, D) [N].
+    """Return changes of passive friction by another width of reversal, (W, N, D) [N].
 
     A row for each of `PASSIVE_WIDTHS`, times the width of the state.
     """
@@ -520,7 +520,7 @@ class ColumnCollector:
         return {Column(name): self.share * column for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
-        """Return what the drives did, with positions as the mechanism has them."""
+        """Return the motion of the drives, with the positions of the mechanism."""
         velocity, acceleration, direction, load, transmitted, effort = (
             np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
         return FullRate(

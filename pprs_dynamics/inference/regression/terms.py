@@ -73,7 +73,7 @@ class Term:
 
 @dataclass(frozen=True)
 class FullRate:
-    """What the drives did at every sample of a recording, in segments; (N, D) arrays.
+    """Motion of the drives at every sample of a recording, in segments; (N, D) arrays.
 
     `effort` is what the model's drives apply, before any sensor; `effort_measured` the
     recording's; `start` the time at which the recording began [s]; `channels` further
@@ -132,7 +132,7 @@ class PlacedEffect:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Where forces are linear: a model, and what makes it differ from the given one.
+    """Point of linearisation: a model, and its differences from the input model.
 
     Parameters
     ----------

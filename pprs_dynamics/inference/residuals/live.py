@@ -90,12 +90,12 @@ class LiveComparison:
 
     @property
     def gaps(self) -> int:
-        """How often the stream was interrupted."""
+        """Number of interruptions of the stream."""
         return self._gaps_before + (0 if self._live is None else self._live.gaps)
 
     @property
     def bridged(self) -> int:
-        """How many single samples were missing, and bridged."""
+        """Number of single missing samples that were interpolated."""
         return self._bridged_before + (0 if self._live is None else self._live.bridged)
 
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:

@@ -36,7 +36,7 @@ class Variable:
 
 
 def progress_of(report: Callable[[float], None], part: int, parts: int) -> Progress:
-    """Return what reports (done, all) of one of several equal parts as a share of the whole."""
+    """Return a function that reports (done, all) of one of several parts as a share of all."""
     return lambda done, total: report((part + done / max(total, 1)) / parts)
 
 

@@ -248,7 +248,7 @@ def reconstruct(
 
 
 def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction:
-    """Return the same reconstruction with the drives where another model's encoders are.
+    """Return the reconstruction with drive positions by another model's encoders.
 
     Blocks do not depend on them.
 

@@ -100,7 +100,7 @@ class Course:
     end: float
 
     def weight(self, time: Array, period: float) -> Array:
-        """Return which share of the effect is there, (M,), in means over a period about times."""
+        """Return the present share of the effect at times, (M,), as means over a period."""
         if self.kind == DRIFT:
             share: Array = (time - self.begin) / max(self.end - self.begin, 1e-300)
             return share
@@ -164,7 +164,7 @@ class Component:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Of the shape."""
+        """Parameters of the shape."""
         return dict(self.shape)
 
     def every(self, coefficients: Array) -> Array:
@@ -213,7 +213,7 @@ class EffectCandidate:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return self.effect.name
 
     @property
@@ -245,7 +245,7 @@ class EffectCandidate:
 
     @property
     def hypotheses(self) -> frozenset[Hashable]:
-        """What it says is there, each of the prior odds of a name.
+        """Hypotheses that it contains, each with the prior odds of a name.
 
         With other coefficients, on other drives or on one, it may be more than one hypothesis:
         asymmetric friction that is dry and viscous is two.
@@ -281,7 +281,7 @@ class UnknownCandidate:
 
     @property
     def name(self) -> str:
-        """In lists of names of effects."""
+        """Name in lists of effects."""
         return f'unknown, {self.family.variable}'
 
     @property
@@ -348,12 +348,12 @@ class CandidateSet:
 
     @cached_property
     def total(self) -> float:
-        """What its terms add up to, whether it may be or not."""
+        """Sum of all terms, also of an inadmissible set."""
         return self.terms.total
 
     @property
     def plain(self) -> float:
-        """What its terms add up to without form errors."""
+        """Sum of all terms but form errors."""
         return self.total - self.terms.forms
 
     @property
@@ -363,17 +363,17 @@ class CandidateSet:
 
     @property
     def cost(self) -> float:
-        """What the search makes as low as possible: infinite for a set that may not be."""
+        """Cost that the search minimises: infinite for an inadmissible set."""
         return self.total if self.is_admissible else inf
 
     @cached_property
     def key(self) -> Hashable:
-        """The same for sets of the same candidates."""
+        """Key that is equal for sets of the same candidates."""
         return set_key(self.candidates)
 
     @property
     def effects(self) -> tuple[EffectCandidate, ...]:
-        """Those of the catalogue."""
+        """Effects of the catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, EffectCandidate))
 
     @cached_property
@@ -399,7 +399,7 @@ class CandidateSet:
 
     @property
     def unknowns(self) -> tuple[UnknownCandidate, ...]:
-        """Those of no catalogue."""
+        """Patterns of no catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, UnknownCandidate))
 
     def without(self, *gone: Candidate) -> tuple[Candidate, ...]:
@@ -418,7 +418,7 @@ class CandidateSet:
 
 
 def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
-    """Return the same for sets of the same candidates."""
+    """Return a key that is equal for sets of the same candidates."""
     return frozenset(candidate.key for candidate in candidates)
 
 

@@ -99,7 +99,7 @@ class DriveComponents:
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
 
     def around(self, regression: Regression) -> DriveComponents:
-        """Return the same effects for the same samples around another operating point."""
+        """Return these components around another operating point."""
         found = copy(self)
         found.regression, found.series = regression, regression.series[self.d]
         if 'score_test' in vars(self):
@@ -260,7 +260,7 @@ class Components:
         return self._terms[key]
 
     def _weight(self, course: Course) -> Array:
-        """Return which share of an effect of a course is there, (M,)."""
+        """Return the present share of an effect with a course, (M,)."""
         residuals = self.design.residuals
         return course.weight(residuals.time, residuals.period)
 

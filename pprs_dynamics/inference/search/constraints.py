@@ -77,7 +77,7 @@ DOUBTED = 2.0  # standard deviations of a mass within which it may be added or t
 
 
 class Constraints:
-    """What coefficients of the effects of a design may be.
+    """Constraints on the coefficients of the effects of a design.
 
     Parameters
     ----------

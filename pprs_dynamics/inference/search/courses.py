@@ -157,7 +157,7 @@ def _courses(fits: FittedSets) -> Iterator[Course]:
 
 
 def _amid_motion(fits: FittedSets, times: Sequence[float]) -> list[float]:
-    """Return those times before and after which a noteworthy share of the motion lies.
+    """Return the times with a noteworthy share of the motion before and after them.
 
     What a robot does at its start, or while it stands at the end, is friction that has not turned
     over or has not settled, and no other state of the machine.

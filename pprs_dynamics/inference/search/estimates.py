@@ -381,7 +381,7 @@ def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Est
 
 
 def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
-    """Return what makes units of a drive's parameters from those of a drive that pushes."""
+    """Return the conversion of a unit of linear drives to that of a drive."""
     if drive is None:
         return lambda unit: unit
     name = drive if isinstance(drive, str) else design.drives[drive]

@@ -117,7 +117,7 @@ def linear_residual(fits: FittedSets, fitted: CandidateSet) -> Array:
 
 def friction_forms(fits: FittedSets, fitted: CandidateSet,
                    kind: type[FrictionForm] = FrictionForm) -> Array:
-    """Return what another form of the model's friction changes, (M, D) [N].
+    """Return the fitted change by another form of the model's friction, (M, D) [N].
 
     Of one kind, such as the width in which it reverses.
     """

@@ -130,7 +130,7 @@ def sample_gains(before: Residuals, after: Residuals) -> tuple[Array, Array]:
 
 
 def predictive_gain(before: Residuals, after: Residuals) -> PredictiveGain:
-    """Return what the second of two models gains on recordings that neither was fitted to."""
+    """Return the gain of a second model over a first on recordings that neither was fitted to."""
     edges = np.linspace(0, len(before), BLOCKS + 1).astype(int)[:-1]
     return PredictiveGain(before.drives, *(
         np.add.reduceat(values, edges, axis=0) for values in sample_gains(before, after)))

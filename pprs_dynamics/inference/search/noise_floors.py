@@ -76,7 +76,7 @@ def measure_columns(
     model: DriveModel, recordings: Sequence[Recording],
     progress: Callable[[float], None] = lambda share: None, decisions: Decisions = DECISIONS,
 ) -> tuple[FittedSets | None, Residuals, tuple[str, ...]]:
-    """Return what a largest fit needs, and what `measure_residuals` returns.
+    """Return columns of the largest fit, and the results of `measure_residuals`.
 
     Of long recordings the former is of the stretches that a search takes. None where
     there are too few samples for any fit.

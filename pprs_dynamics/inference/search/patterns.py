@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive's error could depend on: columns per variable, and the patterns tried on them.
+"""Patterns of a drive's error: columns per variable.
 
 A family belongs to one variable. Its columns are indicators of bins (alone, and times the
 direction of motion) and straight lines; its patterns are the combinations tried: every

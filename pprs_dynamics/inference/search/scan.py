@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which effects, on which drives, would lower the cost of a set: proposals by a scan.
+"""Scan: effects, and their drives, that would lower the cost of a set.
 
 A scan takes all terms in all shapes at the noise of a set's fit, where the gain of each is a matter
 of sums that are known. It proposes; a fit with its own noise decides (`search.search`).
@@ -32,7 +32,7 @@ Scored = tuple[float, Component]  # its gain less its prior cost
 
 
 class Scan:
-    """What may be added to fitted sets.
+    """Scan of the effects that may be added to fitted sets.
 
     Parameters
     ----------

@@ -82,11 +82,11 @@ class ScoreTest(Generic[Label]):
 
     @property
     def rows(self) -> Mapping[int, Array]:
-        """As given."""
+        """Rows of the tested columns."""
         return self._columns.rows
 
     def around(self, regression: Regression) -> ScoreTest[Label]:
-        """Return the same test of the same samples around another operating point."""
+        """Return the test around another operating point."""
         found = copy(self)
         found.regression, found._columns = regression, Columns(regression, self.rows)
         return found

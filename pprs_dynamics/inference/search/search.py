@@ -86,7 +86,7 @@ class Search:
             self._report(1.0)
 
     def _stepped(self) -> None:
-        """Report progress: how much is to be done nobody knows, but it never stands still."""
+        """Report progress that always rises: the amount of work is not known."""
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 

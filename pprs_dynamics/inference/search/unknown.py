@@ -42,7 +42,7 @@ Shared = dict[Hashable, Any]
 
 
 def _once(shared: Shared, key: Hashable, make: Callable[[], Any]) -> Any:
-    """Return what `make` returned at the first call with a key."""
+    """Return the result of `make`, called once for each key."""
     if key not in shared:
         shared[key] = make()
     return shared[key]
@@ -129,7 +129,7 @@ class DrivePatterns:
             residuals.period, residuals.units)
 
     def around(self, regression: Regression) -> DrivePatterns:
-        """Return the same patterns for the same samples around another operating point."""
+        """Return the patterns around another operating point."""
         series = regression.series[self.d]
         if not np.array_equal(series.index, self.series.index):
             return DrivePatterns(regression, self.prior_costs, self.d, self.with_plain_forms)

@@ -132,7 +132,7 @@ def is_lerobot(path: Path) -> bool:
 
 
 def open_arrays(path: Path) -> ArrayTable | None:
-    """Return what is in a file or a dataset of arrays; None where it is neither.
+    """Return the table of a file or a dataset of arrays; None where it is neither.
 
     Raises
     ------
@@ -272,7 +272,7 @@ def _json(path: Path) -> dict[str, Any]:
 
 def _leaves(content: Mapping[str, Any], before: str = '', title: str = '',
             ) -> Iterator[tuple[str, Any]]:
-    """Yield what is in structures by `name.name`, of those in a list by `name[0].name`.
+    """Yield elements of structures by `name.name`, of lists of them by `name[0].name`.
 
     With a title, a structure in a list that has an entry of that name is called by it.
     """

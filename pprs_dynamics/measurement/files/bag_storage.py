@@ -193,7 +193,7 @@ def opened_bag(path: Path) -> Iterator[tuple[Bag, list[Defect]]]:
 
 
 def _storages_of(path: Path) -> tuple[list[Path], list[Defect]]:
-    """Return what rosbags can open: a directory with metadata, or files with their suffixes."""
+    """Return the paths that rosbags can open: a folder with metadata, or files."""
     if not path.is_dir():
         suffix = storage_suffix(path)
         if suffix is not None and path.suffix != suffix:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a file holds, looked into without a model: joints of messages, and columns of tables."""
+"""Contents of a file, read without a model: joints of messages, and columns of tables."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MESSAGES = 400  # of each topic
 
 @dataclass(frozen=True)
 class Contents:
-    """What a file holds.
+    """Contents of a file.
 
     Parameters
     ----------

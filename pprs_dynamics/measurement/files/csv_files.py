@@ -145,7 +145,7 @@ class CsvTable:
 
     @property
     def numbers(self) -> int:
-        """How many cells of the first row hold numbers or dates."""
+        """Number of cells of the first row with numbers or dates."""
         return sum(bool(cell) and _value_of(cell, self.decimal) is not None for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:

@@ -19,7 +19,7 @@ BEHIND = 0, 4, 8  # bytes that rmw_fastrtps leaves behind a message with empty s
 
 
 def message_types() -> Any:
-    """Return what ROS 2 itself defines, in a store of its own."""
+    """Return a type store with the message types of ROS 2."""
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_KILTED)

@@ -77,7 +77,7 @@ class Recording(Samples):
         effort: ArrayLike | None = None, drives: tuple[str, ...] = DRIVES,
         channels: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> Recording:
-        """Judge arrays as a file's content would be.
+        """Return a recording of arrays, checked as the content of a file.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class SegmentSummary:
 
 @dataclass(frozen=True)
 class Summary:
-    """What is in a recording.
+    """Summary of a recording.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ _MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)  # odd, of irregular bits
 
 
 def shared_samples(first: Recording, second: Recording) -> int:
-    """Return how many samples of the second recording are those of the first, in a row.
+    """Return the number of consecutive samples that two recordings share.
 
     Positions and efforts are compared, not times: another format may count them from elsewhere.
     """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a file of joint states holds before it is judged, and what is said about it."""
+"""Samples of a file before they are judged, and findings about them."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Defect:
 
     @property
     def action(self) -> str:
-        """What was done about it, as a clause."""
+        """Action that was taken, as a clause."""
         return POLICY[self.kind]
 
     @property

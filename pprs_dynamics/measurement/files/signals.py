@@ -129,7 +129,7 @@ def stuck_efforts(samples: Samples, drive: int) -> list[tuple[int, int]]:
 
 
 def lost_to_zero(effort: Array) -> tuple[Mask, float]:
-    """Return which efforts of a drive, (N,), fall to 0 and return, and up to what they are 0.
+    """Return the efforts, (N,), that drop out to 0, and the bound of what counts as 0.
 
     At most `ZERO_SAMPLES` in a row, between efforts of one sign that differ from each other by much
     less than from 0. What passes through 0, or rests there, is none. Noise counts as 0, too.
@@ -153,7 +153,7 @@ def lost_to_zero(effort: Array) -> tuple[Mask, float]:
 
 
 def cut_off(effort: Array, position: Array) -> Mask:
-    """Return which efforts, (N,), are at a level that cuts off all higher or lower ones."""
+    """Return the efforts, (N,), at a level that clips all higher or lower ones."""
     found = np.zeros(len(effort), dtype=bool)
     levels, counts = np.unique(effort[np.isfinite(effort)], return_counts=True)
     moves = np.diff(position, prepend=position[:1]) != 0
@@ -182,7 +182,7 @@ def held_for(values: Array) -> int:
 
 
 def first_of_held(values: Array, count: int) -> Mask:
-    """Return which samples have a value, (N, D), for the first time, of those held for `count`."""
+    """Return the first sample of each value, (N, D), that is held for `count` samples."""
     changed = np.concatenate(([True], np.any(values[1:] != values[:-1], axis=1)))
     place = np.arange(len(values))
     first: Mask = (place - np.maximum.accumulate(np.where(changed, place, 0))) % count == 0

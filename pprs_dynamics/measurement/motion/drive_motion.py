@@ -196,7 +196,7 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
 
 def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array], Array],
                 smoothing: Smoothing | None = None) -> tuple[Array, Array, Array]:
-    """Return what is made of measured positions, with its rates, (N, D) each, as these are.
+    """Return values made of positions, and their rates, (N, D) each, smoothed as positions are.
 
     Parameters
     ----------

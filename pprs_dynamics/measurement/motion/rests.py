@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where drives are at rest: static friction makes their efforts arbitrary within its limits."""
+"""Rests of drives: static friction makes their efforts arbitrary within its limits."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def motion_bandwidth(stretches: Sequence[Stretch], smoothing: Smoothing) -> floa
 
 
 def bandwidth(acceleration: Array) -> float:
-    """Return the same of accelerations (N, D) [1 / sample]; 0 where no drive moves."""
+    """Return the bandwidth of accelerations (N, D) [1 / sample]; 0 where no drive moves."""
     window = np.hanning(len(acceleration))[:, None]
     power = np.abs(np.fft.rfft((acceleration - acceleration.mean(axis=0)) * window, axis=0)) ** 2
     total = power.sum(axis=0)

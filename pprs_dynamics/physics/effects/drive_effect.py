@@ -26,7 +26,7 @@ ALONE = 'drive'  # name of one whose name does not matter
 
 
 def other_exponent(quantity: Array, column: Array) -> Array:
-    """Return what an exponent by `EXPONENTS` above 1 adds to a column, to first order.
+    """Return the change of a column by an exponent above 1, to first order.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ class MeasurementEffect(DriveEffect):
     @classmethod
     def sensor_columns(cls, effort: Array, drive: DriveSamples, **shape: float,
                        ) -> tuple[Array, ...]:
-        """Return what the sensor adds to an effort per coefficient, (N,) each.
+        """Return the sensor's change of an effort per coefficient, (N,) each.
 
         An effect without coefficients gives one column: what its shape says.
 
@@ -323,7 +323,7 @@ class MeasurementEffect(DriveEffect):
     @classmethod
     def sensor_deviations(cls, effort: Array, drive: DriveSamples, **shape: float,
                           ) -> tuple[Array, ...]:
-        """Return how what real sensors add departs from the form, (N,) each; see `deviations`."""
+        """Return departures of real sensors from the law, (N,) each; see `deviations`."""
         return ()
 
     @classmethod

@@ -156,7 +156,7 @@ class Effect(ABC):
         """
 
     def measured(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
-        """Return what the sensors measure where the drives apply `effort`, (N, D)."""
+        """Return the efforts that sensors measure where the drives apply `effort`, (N, D)."""
         return effort + self.force(state, memory)
 
     def initial_memory(self, start: float | None = None) -> Any:
@@ -458,7 +458,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
-        """Return what is claimed with these coefficients; each costs the prior odds of a name."""
+        """Return the hypotheses of these coefficients; each costs the prior odds of a name."""
         return frozenset({names})
 
     @classmethod

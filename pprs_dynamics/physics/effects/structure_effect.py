@@ -196,7 +196,7 @@ class AddedBody(BodyEffect):
 
     @classmethod
     def moments_about_links(cls) -> dict[str, dict[str, float]]:
-        """Return what a body adds to the first moments of its link about the link's frame.
+        """Return the first moments that a body adds to its link, about the link's frame.
 
         By name of a coefficient: weights of coefficients.
         """
@@ -206,7 +206,7 @@ class AddedBody(BodyEffect):
 
     @classmethod
     def prefix_of(cls, place: BodyPlace) -> str:
-        """Return what the names of the parameters at a place begin with."""
+        """Return the prefix of the parameter names of a place."""
         return f'{place.link}.' if cls.is_of_one_place else ''
 
     @classmethod

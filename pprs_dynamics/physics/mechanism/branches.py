@@ -17,7 +17,7 @@ GRIPPER = 2  # joints beyond a flange that may be fingers
 
 @dataclass(frozen=True)
 class Branch:
-    """What is between the base and a link.
+    """Chain of joints from the base to a link.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def as_likely(description: Description, recorded: Collection[str] = ()) -> list[
 
 
 def _rank(link: str) -> int:
-    """Return how far down a link's name stands among those of tools; their number for none."""
+    """Return the rank of a link's name among names of tools; their number for none."""
     name = link.lower()
     return next((k for k, tool in enumerate(TOOLS) if name == tool or name.endswith(
         (f'_{tool}', f'-{tool}')) or (tool in ('tool0', 'tcp', 'flange') and tool in name)),

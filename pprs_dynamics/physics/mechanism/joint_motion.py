@@ -64,7 +64,7 @@ class JointSeries:
         return int(resting_series(tuple(range(1, harmonics + 1))).shape[1])
 
     def scaled(self, factor: float) -> JointSeries:
-        """Return the same motion with all excursions times a factor."""
+        """Return the motion with all excursions multiplied by a factor."""
         return replace(self, coefficients=factor * self.coefficients)
 
     def motion(self, time: Array) -> JointMotion:

@@ -142,7 +142,7 @@ class LinkMotion:
         return tree.link_jacobians(self.structure.tables, self.motion, self.motion.drive_to_joint)
 
     def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None) -> Loads:
-        """Return what joints and closures transmit without friction; see `Evaluation.forces`."""
+        """Return the frictionless loads of joints and closures; see `Evaluation.forces`."""
         return self.structure.evaluation.forces(
             self.rows, inertial, gravity, {} if load is None else self.wrenches_of(load))
 

@@ -83,7 +83,7 @@ class Mechanism:
 
     @property
     def masses(self) -> Array:
-        """Of the bodies [kg], (B,)."""
+        """Masses of the bodies [kg], (B,)."""
         return self.inertial[:, 0]
 
     @property
@@ -261,7 +261,7 @@ class Mechanism:
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          closed: dict[Any, Array] | None = None) -> JointMotion:
-        """Return the same: loops are closed where forces are evaluated."""
+        """Return the motion of the drives; loops are closed where forces are evaluated."""
         return JointMotion(position, velocity, acceleration)
 
     def at_home(self, samples: int) -> JointMotion:
@@ -300,7 +300,7 @@ class Mechanism:
                              start, nearby)
 
     def loads(self, links: LinkMotion, load: StructureLoad | None) -> Loads:
-        """Return what joints and closures transmit without friction."""
+        """Return the frictionless loads of joints and closures."""
         return links.loads(self.by_joint, self.gravity_row, load)
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
@@ -343,7 +343,7 @@ class Mechanism:
         return found
 
     def friction_load(self, state: MechanismState) -> Array:
-        """Return what the drives' gears carry [N m, N], (N, D)."""
+        """Return the loads of the drives' gears [N m, N], (N, D)."""
         return np.abs(state.transmitted)
 
     def load_of_friction(self, state: MechanismState, joints: JointFriction) -> None:

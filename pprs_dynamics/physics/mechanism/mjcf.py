@@ -42,7 +42,7 @@ FOREIGN_PARTS = {'ntendon': 'tendons', 'nflex': 'flexible bodies', 'nplugin': 'p
 
 
 def read_mjcf(path: str) -> Description:
-    """Return what an MJCF says, at its reference configuration.
+    """Return the description in an MJCF file, at its reference configuration.
 
     Raises
     ------

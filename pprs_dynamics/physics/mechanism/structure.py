@@ -94,7 +94,7 @@ ROWS: dict[str, tuple[Row, ...]] = {
 
 @dataclass(frozen=True)
 class Mobility:
-    """What closures leave free at home.
+    """Degrees of freedom that the closures leave at home.
 
     Parameters
     ----------

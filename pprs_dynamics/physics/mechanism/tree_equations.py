@@ -289,7 +289,7 @@ def length_of(kind: type, sizes: Integers) -> int:
 
 
 def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
-    """Return what rows (N, K) hold by name, the samples first."""
+    """Return the arrays in rows (N, K) by name, the samples first."""
     return kind(*(table[:, start:end].reshape(len(table), *shape) for start, end, shape in _places(
         kind, tuple(sizes.tolist()))))
 
@@ -476,7 +476,7 @@ def residual(t: Model, m: Data, r: int) -> Any:
 
 
 def row_axis(t: Model, m: Data, r: int) -> Vector:
-    """Return what a row multiplies the relative velocity by: of points, or angular."""
+    """Return the axis by which a row multiplies the relative velocity: of points, or angular."""
     k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
         return column(loops, k, A_R, i)
@@ -1083,7 +1083,7 @@ class Evaluation:
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
                wrenches: Mapping[int, tuple[Array, Array]]) -> Loads:
-        """Return what joints and closures transmit, for rows of `forward_kinematics`.
+        """Return the loads of joints and closures, for rows of `forward_kinematics`.
 
         Parameters
         ----------

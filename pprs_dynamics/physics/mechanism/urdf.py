@@ -72,7 +72,7 @@ def read_content(path: str) -> bytes:
 
 
 def read_urdf(path: str) -> Description:
-    """Return what a URDF says.
+    """Return the description in a URDF file.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def _listed(names: list[str]) -> str:
 
 def _read(path: str, elements: list[ElementTree.Element],
           reader: Callable[[ElementTree.Element], Item]) -> dict[str, Item]:
-    """Return what a reader makes of links or joints, by name."""
+    """Return links or joints by name, each made by a reader."""
     found: dict[str, Item] = {}
     for element in elements:
         name = element.get('name')

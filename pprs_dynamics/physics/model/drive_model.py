@@ -230,7 +230,7 @@ class DriveModel:
 
     @property
     def title(self) -> str:
-        """What it is a model of, for a sentence."""
+        """Kind of robot, for a sentence."""
         return title_of(self.values)
 
     @cached_property
@@ -267,7 +267,7 @@ class DriveModel:
 
     @property
     def recorded_gain(self) -> Array:
-        """What efforts of recordings are multiplied by to give efforts in N and N m, (D,)."""
+        """Factors from recorded efforts to N and N m, (D,)."""
         if self.gain is not None and self.efforts_in_amperes:
             return np.asarray(self.gain)
         return np.ones(len(self.drives))
@@ -293,7 +293,7 @@ class DriveModel:
         return (find_effect(effect.name) or effect).bound(self.robot)
 
     def mechanism(self, motion: Motion, closed: dict[Any, Array] | None = None) -> MechanismState:
-        """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
+        """Return the mechanism's state for a motion; see `drive_forces` and `ModelState.closed`."""
         state: MechanismState = self.robot.state(motion, self.reversal, self._joint_friction,
                                                  closed)
         return state
@@ -456,7 +456,7 @@ class DriveModel:
 
     @property
     def assumed_at_start(self) -> dict[str, str]:
-        """What a fresh state takes for granted, by effect with a memory."""
+        """Assumptions of a fresh state, by effect with a memory."""
         return {effect.name: effect.assumed_at_start for effect in self.effects
                 if effect.assumed_at_start}
 
@@ -511,7 +511,7 @@ class DriveModel:
 
     @property
     def lateness(self) -> Array:
-        """By how much efforts are measured late, (D,) [s]."""
+        """Delays of the measured efforts, (D,) [s]."""
         return np.array([sum(effect.drives.get(drive, {}).get(effect.late_by, 0.0)
                              for effect in self.effects if isinstance(effect, MeasurementEffect))
                          for drive in self.drives])

@@ -279,7 +279,7 @@ def is_described(names: Iterable[str]) -> bool:
 
 
 def title_of(parameters: Mapping[str, Any]) -> str:
-    """Return what keys and values are a model of, for a sentence."""
+    """Return the kind of robot that keys and values describe, for a sentence."""
     if any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
            for name, value in parameters.items()):
         return 'a robot with loops'

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a model's drives are called on the machine: in messages, and in the columns of files.
+"""Names of a model's drives on the machine: in messages, and in the columns of files.
 
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
 time_fraction: COLUMN, time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …},
@@ -34,7 +34,7 @@ MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY, EXTERNAL = EFFORT_KINDS = (
 
 
 def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, ...]:
-    """Return what messages and recordings call the drives, in their order.
+    """Return the names of the drives in messages and recordings, in their order.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, 
 
 
 def effort_kind(values: Mapping[str, Any]) -> str:
-    """Return what the efforts of recordings are, by a model file: one of `EFFORT_KINDS`.
+    """Return the kind of recorded efforts by a model file: one of `EFFORT_KINDS`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which messages ask a model for forces, and their motion, or the rule that they break."""
+"""Requests for forces: the motion in a message, or the rule that it breaks."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class Timing(NamedTuple):
 
     @classmethod
     def of(cls, node_values: Mapping[str, Any]) -> Timing:
-        """Return that of a node's parameters, which have its names."""
+        """Return the timing of a node's parameters, which have the same names."""
         return cls(*(node_values[name] for name in cls._fields))
 
     def check(self, request: TrajectoryRequest, now: int, waited: float = 0.0) -> None:
@@ -287,7 +287,7 @@ class RequestReader:
                             f'must be {self._frame!r} or empty')
 
     def _lacking(self, points: Sequence[Any], missing: str) -> Mask:
-        """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
+        """Return the points that may lack velocities and accelerations, and do, (N, 2).
 
         Raises
         ------

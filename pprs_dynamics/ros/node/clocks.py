@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What goes by the steady (monotonic) clock: timers, stale commands; whether /clock is missing."""
+"""Timers and the command watchdog on the steady clock; check for a missing /clock."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class NotSetError(PprsError):
 
 
 class OwnerStatus(NamedTuple):
-    """What the node that drives says of itself.
+    """Status of the node that drives.
 
     Parameters
     ----------

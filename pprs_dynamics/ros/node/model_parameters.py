@@ -195,7 +195,7 @@ class ModelParameters:
         return model, node_values
 
     def _staying(self, model: DriveModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what holds as long as the node runs, its topics were made by it."""
+        """Return the values that stay as long as the node runs, as its topics depend on them."""
         names = {DRIVES_KEY: model.drives,
                  'joint_prefix and joint_map': model.recorded.joints}
         return {**{name: ', '.join(value) for name, value in names.items()},

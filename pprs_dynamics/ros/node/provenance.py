@@ -49,7 +49,7 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
 
 
 def hardware_of(model: DriveModel) -> str:
-    """Return which robot a model is of: an arm by its URDF."""
+    """Return the name of the robot that a model describes: an arm by its URDF."""
     name = model.title.partition(' ')[2]
     described = [Path(model.values[key]).stem for key in FILES if model.values.get(key)]
     return ' '.join((name, *described))

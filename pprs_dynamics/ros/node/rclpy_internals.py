@@ -73,7 +73,7 @@ class WaitSet:
             raise InternalsChangedError(f'WaitSet: {error}') from error
 
     def ready(self, kind: str, entities: Sequence[Any]) -> list[Any]:
-        """Return those entities of a kind that were ready, e.g. a 'subscription'."""
+        """Return the ready entities of a kind, e.g. 'subscription'."""
         if not entities:
             return []
         try:

@@ -24,7 +24,7 @@ GONE = '_NODE_NAME_UNKNOWN_'  # of a node that was destroyed, but not its publis
 
 
 class Senders:
-    """What is known of the messages of one topic.
+    """Publishers of one topic, by the messages that come.
 
     Parameters
     ----------
@@ -76,6 +76,6 @@ def publishers_of(node: Node, topic: str, others: bool = False) -> str:
 
 
 def namesakes(node: Node) -> int:
-    """Return how many other nodes have the name of this one, as discovery knows them."""
+    """Return the number of other nodes with this node's name, by discovery."""
     this = (node.get_name(), node.get_namespace())
     return max(0, sum(found == this for found in node.get_node_names_and_namespaces()) - 1)

@@ -54,7 +54,7 @@ Joints = dict[str, dict[str, float]]
 
 
 def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
-    """Return what a format can hold of a model.
+    """Return the parts of a model that a format can express.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
 
 
 class TreePose(NamedTuple):
-    """Where the parts of an exported robot are.
+    """Poses of the parts of an exported robot.
 
     Parameters
     ----------

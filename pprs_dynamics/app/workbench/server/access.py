@@ -67,7 +67,7 @@ class Keys:
 
     @property
     def address(self) -> str:
-        """With a token that has not been used yet."""
+        """Address of the page, with a token that has not been used yet."""
         return f'http://{self.names[0]}/?{TOKEN}={self._token}'
 
     def exchange(self, token: str) -> str | None:

@@ -272,7 +272,7 @@ class Api:
         return self.screen(body)
 
     def shares(self, body: Fields) -> Response:
-        """Say what unticked effects explain in a brush, and when that was."""
+        """Answer the shares that unticked effects explain of a selection, and its times."""
         ticks = self.hub.the_session.ticks
         if 'x' in body:
             mask = region_mask(ticks, body.text('x'), body.text('y'), body.range('x_range'),

@@ -75,13 +75,13 @@ class AsymmetricFriction(DriveEffect):
 
     @classmethod
     def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
-        """Return which parts there are: dry and viscous friction are two things."""
+        """Return the parts that are present: dry and viscous friction are two hypotheses."""
         parts = {'dry': FORCES, 'viscous': VISCOUS}
         return frozenset(part for part, those in parts.items() if set(names) & set(those))
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what thinning with speed adds to viscous friction."""
+        """Return the change of viscous friction by thinning with speed."""
         none = np.zeros_like(drive.velocity)
         *_, forward, backward = cls.columns(drive)
         return ((none, none, other_exponent(drive.velocity, forward),

@@ -92,7 +92,7 @@ class EffortFilter(MeasurementEffect):
     @classmethod
     def sensor_deviations(cls, effort: Array, drive: DriveSamples, **shape: float,
                           ) -> tuple[Array, ...]:
-        """Return what one lag instead of two adds, of which other orders do a share."""
+        """Return the change by one lag instead of two, of which other orders do a share."""
         if drive.time is None or len(drive.time) < 2:
             return (np.zeros_like(effort),)
         step = float(np.median(np.diff(drive.time)))

@@ -70,5 +70,5 @@ class GearEfficiency(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what another exponent of the load adds, as to `load_friction`."""
+        """Return the change by another exponent of the load, as of `load_friction`."""
         return (tuple(other_exponent(drive.transmitted, row) for row in cls.columns(drive)),)

@@ -63,5 +63,5 @@ class LoadFriction(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what another exponent of the load adds: 2/3 in Hertzian contacts."""
+        """Return the change by another exponent of the load: 2/3 in Hertzian contacts."""
         return (tuple(other_exponent(drive.friction_load, row) for row in cls.columns(drive)),)

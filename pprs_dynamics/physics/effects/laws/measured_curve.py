@@ -140,7 +140,7 @@ class MeasuredCurve(DriveEffect):
         return force
 
     def left(self, state: MechanismState) -> str | None:
-        """Return which measured range a state is outside of, as a sentence, or None."""
+        """Return the sentence that a state is outside the measured range, or None."""
         for drive, curve in self.curves.items():
             x = variable_of(state, drive, curve.variable)
             outside = curve.outside(x)

@@ -53,6 +53,6 @@ class ViscousFriction(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what a difference by direction adds, and thinning with speed."""
+        """Return the changes by a difference in direction, and by thinning with speed."""
         return ((DIRECTIONS * np.abs(drive.velocity),),
                 (other_exponent(drive.velocity, drive.velocity),))
