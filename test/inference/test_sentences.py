@@ -119,16 +119,15 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     assert _parser(words).parse_args(words).topic == '/arm/joint_states'
 
 
-def test_an_effect_that_is_not_confirmed_is_named_and_nothing_is_adopted() -> None:
+def test_an_effect_that_is_not_confirmed_is_named_beside_those_that_are() -> None:
     refuted = made.found_effect('hysteresis', objection='held-out data are predicted worse with it')
-    found = made.made_up_diagnosis('unknown', effects=(made.found_effect('coulomb_friction'),),
-                              unconfirmed=(refuted,))
-    assert word_diagnosis(found).headline == (
-        'The model lacks coulomb_friction on lift_2. Not confirmed: hysteresis on lift_2 '
-        '(held-out data are predicted worse with it).')
-    following, command = next_step(found, GivenFiles(('a.csv',)))
-    assert following.startswith('Do not add hysteresis')
-    assert command.startswith('pprs diagnose a.csv')
+    found = made.made_up_diagnosis('effect', effects=(made.found_effect('coulomb_friction'),),
+                                   unconfirmed=(refuted,))
+    words = word_diagnosis(found)
+    assert words.headline.startswith('The model lacks coulomb_friction on lift_2. With it the error')
+    assert words.barred == (
+        'hysteresis on lift_2: not reported, because held-out data are predicted worse with it',)
+    assert words.command.startswith('pprs adopt coulomb_friction')
 
 
 @pytest.mark.parametrize('count', [0, 1, 2])

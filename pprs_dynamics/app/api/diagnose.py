@@ -175,7 +175,7 @@ def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
 
 def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
     return [('Suspects: effects that cost little more than they explain', words.suspects),
-            ('Excluded sets', words.barred),
+            ('Excluded', words.barred),
             ('Calibrated numbers of the model', words.calibrated)]
 
 

@@ -139,8 +139,9 @@ class Answer:
                                   self.decisions, known)
         drifts = any(effect.course is not None and effect.course.kind != SINCE
                      for effect in effects)
-        verdict = ('unknown' if unconfirmed or depends or above or little or drifts
-                   else 'ambiguous' if rivals else 'effect' if effects else 'adequate')
+        verdict = ('unknown' if depends or above or little or drifts
+                   else 'ambiguous' if rivals else 'effect' if effects
+                   else 'unknown' if unconfirmed else 'adequate')
         moved = [number for number in calibrations(self.fits, self.fitted)
                  if abs(number.after - number.value) > self.decisions.sure * number.std]
         first = table.first.design
@@ -348,8 +349,9 @@ def objection(ratio: float, gain: PredictiveGain | None, decisions: Decisions) -
 def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
     """Return the answer of a table: that of the row of least cost.
 
-    Where an effect of it is not confirmed, the verdict is `unknown`, and the answer is that of the
-    row without it. On drives that are predicted worse with it, the effect is not reported.
+    Where an effect of it is not confirmed, the answer is that of the row without it: what remains
+    then decides about the verdict, and with no effect left it is `unknown`. On drives that are
+    predicted worse with it, the effect is not reported.
     """
     fits = table.best.fits
     unconfirmed: tuple[FoundEffect, ...] = ()
@@ -377,8 +379,8 @@ def on_other_drives(candidate: EffectCandidate | UnknownCandidate, drives: Seque
     return kept if len(kept) < len(candidate.components) else []
 
 
-@outside_cost('an effect that raises the error, on the recordings or held out, is not confirmed: '
-              '`unknown`')
+@outside_cost('an effect that raises the error, on the recordings or held out, is not reported; '
+              'with no other effect: `unknown`')
 def unconfirmed_effects(answer: Answer) -> tuple[FoundEffect, ...]:
     """Return the effects of a row that data do not confirm: all where they cancel each other."""
     effects = answer.effects

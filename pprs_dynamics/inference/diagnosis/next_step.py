@@ -169,7 +169,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                     'Friction that depends on load grows with it', other)
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
-    if diagnosis.unconfirmed:
+    if diagnosis.unconfirmed and not effects:
         return (f'Do not add {listed([effect.name for effect in diagnosis.unconfirmed])}. Record '
                 'another motion, and diagnose both recordings', both)
     if len(effects) == 1:

@@ -164,9 +164,10 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(with_drives(suspect.name, suspect.drives, diagnosis.residuals.drives)
               + f': possible, but it costs {-suspect.evidence:.1f} more than it explains. A longer '
               'recording decides' for suspect in diagnosis.suspects),
-        tuple(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. This set '
-              f'{_cost(ranked)}'
-              for ranked in diagnosis.barred),
+        (*(f'{_title(diagnosis, effect)}: not reported, because {effect.objection}'
+           for effect in diagnosis.unconfirmed),
+         *(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. This set '
+           f'{_cost(ranked)}' for ranked in diagnosis.barred)),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command, word_reference(diagnosis.since))
 
@@ -345,13 +346,10 @@ def _headline(diagnosis: Diagnosis) -> str:
     level = (f'; {unseen}.' if unseen else ', which is the noise.' if is_noise
              else f'; the noise is {noise}.')
     begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
-    refuted = listed([f'{_title(diagnosis, effect)} ({effect.objection})'
-                      for effect in diagnosis.unconfirmed])
     refitted = ' and refitted numbers of the model' * is_refit(diagnosis)
     fall = f'With {"it" if len(effects) == 1 else "them"}{refitted} the error ' + change(
         root_mean_square(diagnosis.residuals.error), residual, unit)
-    return f'{begin}{lacking[1:]}. ' + (f'Not confirmed: {refuted}.' if refuted
-                                        else f'{fall}{level}')
+    return f'{begin}{lacking[1:]}. {fall}{level}'
 
 
 def _lacking(diagnosis: Diagnosis) -> str:

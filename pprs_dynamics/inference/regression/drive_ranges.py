@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+from scipy import fft
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
@@ -72,7 +72,10 @@ def _delay(recording: FullRate, drive: int) -> float:
     columns = np.vstack((columns, np.full(len(even), len(even) ** -0.5)))
     # The same efforts for every delay, which have a past and a future of all of them.
     inner = seen[most:-most] - seen.mean()
-    alike = signal.correlate(columns, inner[None], 'valid', 'fft')
+    # Correlations by the FFT; `scipy.signal` has them as well, but takes 0.4 s to import.
+    size = fft.next_fast_len(len(even), real=True)
+    alike = fft.irfft(fft.rfft(columns, size) * fft.rfft(inner, size).conj(), size)[
+        :, :len(even) - len(inner) + 1]
     sums = np.cumsum(columns[:, None] * columns, axis=2)
     sums = np.concatenate((np.zeros((*sums.shape[:2], 1)), sums), axis=2)
     grams = (sums[..., len(inner):] - sums[..., :-len(inner)]).transpose(2, 0, 1)
