@@ -220,7 +220,7 @@ def test_an_effect_is_not_reported_on_drives_that_held_out_data_refute(
     effect = CATALOGUE['effort_offset']
     candidate = EffectCandidate.of([Component.of(effect, d, {}, ('force',)) for d in (0, 1)])
     assert [component.drive for component in on_other_drives(
-        candidate, DRIVES, gain(*in_errors))] == kept
+        candidate, DRIVES, gain(*in_errors).losing)] == kept
 
 
 @pytest.mark.parametrize(('rises', 'count'), [(0.9, 0), (1.1, 2)])

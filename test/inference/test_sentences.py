@@ -124,7 +124,7 @@ def test_an_effect_that_is_not_confirmed_is_named_beside_those_that_are() -> Non
     found = made.made_up_diagnosis('effect', effects=(made.found_effect('coulomb_friction'),),
                                    unconfirmed=(refuted,))
     words = word_diagnosis(found)
-    assert words.headline.startswith('The model lacks coulomb_friction on lift_2. With it the error')
+    assert words.headline.startswith('The model lacks coulomb_friction on lift_2. With it the ')
     assert words.barred == (
         'hysteresis on lift_2: not reported, because held-out data are predicted worse with it',)
     assert words.command.startswith('pprs adopt coulomb_friction')

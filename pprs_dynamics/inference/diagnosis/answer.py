@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -183,6 +183,13 @@ class Answer:
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
+    def losing(self, effect: FoundEffect) -> set[str]:
+        """Return the drives whose error an effect raises, on the recordings or held out."""
+        raised = {drive for d, drive in enumerate(self.drives) if np.any(effect.force[:, d])
+                  and root_mean_square(self.remaining[:, d])
+                  >= root_mean_square(self.remaining[:, d] + effect.force[:, d])}
+        return raised.union(() if effect.gain is None else effect.gain.losing)
+
     def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
         """Return held-out errors without and with an effect, and its gain where it is known."""
         fits, fitted = self.fits, self.fitted
@@ -350,8 +357,8 @@ def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
     """Return the answer of a table: that of the row of least cost.
 
     Where an effect of it is not confirmed, the answer is that of the row without it: what remains
-    then decides about the verdict, and with no effect left it is `unknown`. On drives that are
-    predicted worse with it, the effect is not reported.
+    then decides about the verdict, and with no effect left it is `unknown`. An effect that some
+    drives refute is not reported on these.
     """
     fits = table.best.fits
     unconfirmed: tuple[FoundEffect, ...] = ()
@@ -362,7 +369,7 @@ def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
             effect = refuted.get(candidate.name)
             if effect is None:
                 rest.append(candidate)
-            elif kept := on_other_drives(candidate, answer.drives, effect.gain):
+            elif kept := on_other_drives(candidate, answer.drives, answer.losing(effect)):
                 rest.append(EffectCandidate.of(kept))
             else:
                 unconfirmed = (*unconfirmed, effect)
@@ -371,9 +378,8 @@ def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
 
 
 def on_other_drives(candidate: EffectCandidate | UnknownCandidate, drives: Sequence[str],
-                    gain: PredictiveGain | None) -> list[Component]:
-    """Return an effect's parts on the drives that held-out data do not refute; none for all."""
-    losing = () if gain is None else gain.losing
+                    losing: Collection[str]) -> list[Component]:
+    """Return an effect's parts on the drives that do not lose by it; none for all."""
     kept = [component for component in candidate.components
             if component.drive is not None and drives[component.drive] not in losing]
     return kept if len(kept) < len(candidate.components) else []
