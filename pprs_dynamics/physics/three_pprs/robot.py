@@ -493,9 +493,10 @@ class ThreePprs(Alike):
                  has_state: bool = False) -> tree.InverseDynamicsResult | None:
         """Return the forces for a motion, friction included; see `Mechanism.one_pass`."""
         # Memory is what limits long motions: the rows that only a state reads take 12 % longer.
-        rows = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
-        table = np.empty((rows, len(motion), 6))
-        if run(closed_form.forces, parameters, motion.rows, closed_form.NO_LOAD, table) >= 0:
+        size = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
+        rows = motion.rows
+        table = np.empty((size, len(rows), 6))
+        if run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table) >= 0:
             return None
         return tree.InverseDynamicsResult(
             None, table, table[closed_form.POSITION:closed_form.GUIDE_LOAD])
