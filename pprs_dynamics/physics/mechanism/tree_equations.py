@@ -770,8 +770,6 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):
-        if _is_zero(inertial, j):
-            continue
         mass = inertial[j, 0]
         h = turned(links, j, R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
         a, w, wd = minus(vector(links, j, UD), g), vector(links, j, W), vector(links, j, WD)
@@ -791,13 +789,6 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
         increase(o.links, i, FORCE, f)
         increase(o.links, i, MOMENT, plus(n, product(arm, f)))
     project_to_actuators(t.passive, t.drives, m.drive_to_joint, o)
-
-
-def _is_zero(inertial: Any, j: int) -> bool:
-    for k in range(PARAMETERS):  # noqa: SIM110 Numba compiles no generators
-        if inertial[j, k] != 0.0:
-            return False
-    return True
 
 
 def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
