@@ -73,10 +73,6 @@ class LinkMotion:
         found._require_closed()
         return found
 
-    def part(self, samples: slice) -> LinkMotion:
-        """Return the motion of some samples."""
-        return LinkMotion(self.structure, self.rows[samples])
-
     @cached_property
     def motion(self) -> Data:
         """The motion by name."""
