@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.joint_motion import DrivePath
 from pprs_dynamics.physics.model.forces import DriveLimits
 
@@ -220,7 +221,7 @@ class DriveControl:
 
     def _limited(self, now: float, wanted: Array) -> Array:
         limits = self._limits
-        effort: Array = np.minimum(np.maximum(wanted, -limits.efforts), limits.efforts)
+        effort = limits.clamped(wanted)
         over = effort != wanted
         if over.any():
             for i in np.flatnonzero(over & ~self._at_limit):
@@ -240,13 +241,10 @@ class DriveControl:
         if (setpoint.position is None) != (setpoint.velocity is None):
             return 'it must have both position and velocity, or neither'
         if setpoint.position is not None:
-            lower, upper = self._limits.strokes
-            outside = (setpoint.position < lower) | (setpoint.position > upper)
-            if outside.any():
-                i = int(np.argmax(outside))
-                unit = self._limits.units[i].position
-                return (f'{self._limits.drives[i]} at {setpoint.position[i]:.6g} {unit} lies '
-                        f'outside its stroke [{lower[i]:g}, {upper[i]:g}] {unit}')
+            try:
+                self._limits.check_strokes(setpoint.position[None])
+            except WorkspaceError as error:
+                return f'{error.found}, but {error.rule}'
         return ''
 
     def _note(self, now: float, code: NoteCode, message: str) -> None:

@@ -107,7 +107,7 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
         robot.tick()
     assert plant.position == pytest.approx(home, abs=1e-9)
     assert not robot.command(Setpoint(home + 1.0, np.zeros(6)))
-    assert 'leg_1 at 1.4847 m lies outside its stroke' in robot.notes[-1].message
+    assert 'leg_1 would have to be at 1.4847 m' in robot.notes[-1].message
     robot.command(Setpoint(None, None, np.full(6, 1e6)))
     robot.tick()
     assert robot.notes[-1].code == 'SATURATED'
