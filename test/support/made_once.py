@@ -47,6 +47,7 @@ def made_once(make: Callable[..., Any], *arguments: Any) -> Any:
     if path.is_file():
         return pickle.loads(path.read_bytes())
     made = make(*arguments)
+    path.parent.mkdir(parents=True, exist_ok=True)  # tests of sources that changed meanwhile
     new = path.with_suffix(f'.{os.getpid()}')
     new.write_bytes(pickle.dumps(made))
     new.replace(path)
