@@ -86,7 +86,7 @@ def in_one_line(text: str) -> str:
 def test_a_row_shows_a_fall_of_the_error_that_three_digits_hide() -> None:
     assert fall(0.080844, 0.080791) == '0.08084 → 0.08079'
     assert fall(9.73, 7.41) == '9.73 → 7.41'
-    assert change(0.1101712, 0.1101711) == 'falls from 0.11 N by less than 0.001%'
+    assert change(0.1101712, 0.1101711) == 'falls from 0.110 N by less than 0.001%'
 
 
 @pytest.mark.parametrize('make', [ambiguous, everything])

@@ -36,7 +36,7 @@ from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.quantities import (
     as_fitted,
     in_unit,
-    plain,
+    measured,
     with_drives,
     with_uncertainty,
 )
@@ -141,7 +141,7 @@ class AdoptionResult(Result):
         answer = self.adoption
         word, colour = (('refused', 'red') if not answer.adopted else
                         ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
-        errors = [f'  error on {label}: {plain(before)} → {plain(after)} {answer.unit}'
+        errors = [f'  error on {label}: {measured(before)} → {measured(after)} {answer.unit}'
                   for label, before, after in (
                       ('recordings', answer.error_before, answer.error_after),
                       (self._held_out, answer.held_out_before, answer.held_out_after))]

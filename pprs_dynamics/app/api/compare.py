@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command,
 from pprs_dynamics.inference.diagnosis.comparison import Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
-from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as
+from pprs_dynamics.inference.diagnosis.quantities import measured, percent, rounded_as
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
@@ -87,10 +87,10 @@ class ComparisonResult(Result):
         marked = ('rms',) if len(comparison.unit) > 1 else ('rms', 'bias', 'peak', 'noise')
         return ('drive', *(f'{name} [{comparison.unit}]' if name in marked else name
                            for name in headings), 'grade'), [
-            (name, plain(drive.rms), percent(drive.relative),
+            (name, measured(drive.rms), percent(drive.relative),
              rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
              percent(drive.explained_variance),
-             '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
+             '' if drive.noise_floor is None else measured(drive.noise_floor, 2),
              drive.grade)
             for name, drive in comparison.drives.items()]
 

@@ -18,7 +18,7 @@ from pprs_dynamics.app.report.pictures import plot_errors
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.diagnosis.quantities import (
-    plain,
+    measured,
     sentence,
     with_uncertainty,
     word_little,
@@ -78,8 +78,8 @@ class FitResult(Result):
         """Drives, units, errors before, after and held out."""
         fit, model = self.fit, self.inputs.model
         return ('drive', 'unit', 'before', 'after', 'held out'), [
-            (drive, unit.effort, plain(fit.error_before[drive]), plain(fit.error_after[drive]),
-             plain(fit.held_out[drive]) if drive in fit.held_out else '')
+            (drive, unit.effort, *(measured(errors[drive]) if drive in errors else ''
+                                   for errors in (fit.error_before, fit.error_after, fit.held_out)))
             for drive, unit in zip(model.drives, model.units, strict=True)
             if drive in fit.error_after]
 

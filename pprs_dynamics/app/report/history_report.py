@@ -11,7 +11,7 @@ from typing import Any
 
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table
-from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, plain, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, measured, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
 from pprs_dynamics.system.plain_text import counted, first_of
 
@@ -49,13 +49,13 @@ def details(step: Step) -> list[str]:
 
 def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
     largest = max(max(step.error_before, step.error_after) for step in steps)
-    rows = [('', 'before', plain(steps[0].error_before), plain(steps[0].held_out_before),
+    rows = [('', 'before', measured(steps[0].error_before), measured(steps[0].held_out_before),
              _bar(steps[0].error_before, largest, 'red'))]
-    rows += [(f'{number}', escape(label), plain(step.error_after), plain(step.held_out_after),
+    rows += [(f'{number}', escape(label), measured(step.error_after), measured(step.held_out_after),
               _bar(step.error_after, largest, 'green'))
              for number, (label, step) in enumerate(_labelled(steps), start=1)]
     noise = steps[-1].noise_floor
-    rows.append(('', 'noise', plain(noise), '', _bar(noise, largest, 'white')))
+    rows.append(('', 'noise', measured(noise), '', _bar(noise, largest, 'white')))
     yield text_table(('', 'effect', 'error', 'held out', ''), rows, right=(2, 3),
                      whole=(0, 2, 3, 4), frame='head',
                      title=f'Error of the model, rms [{unit}], as effects were added')
@@ -69,7 +69,7 @@ def _labelled(steps: Sequence[Step]) -> Iterator[tuple[str, Step]]:
     """Yield steps after what each did: + for an effect that was added or set, - for one less."""
     for before, step in zip((None, *steps), steps, strict=False):
         on = f' on {", ".join(step.drives)}' if step.drives else ''
-        again = f' (before, on its own recordings: {plain(step.error_before)})' if (
+        again = f' (before, on its own recordings: {measured(step.error_before)})' if (
             before is not None and step.sha256 != before.sha256) else ''
         yield f'{"-" if step.removed else "+"} {step.effect}{on}{again}', step
 

@@ -18,11 +18,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.inference.diagnosis.quantities import plain
+from pprs_dynamics.inference.diagnosis.quantities import measured
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
-HEIGHT = 320  # [px], of figures that say none
+HEIGHT = 320  # [px], of figures without a height
 # plotly.js 4.1.1 with lines, bars and markers only: it starts four times as fast as the whole.
 BASIC = 'plotly-basic.min.js.gz'
 # uPlot 1.6.32, for the workbench.
@@ -224,7 +224,7 @@ class Page:
         UnreadableFileError
             Where it cannot be written.
         """
-        # Names of files may hold bytes that are no text.
+        # Names of files may contain bytes that are no text.
         write_text(path, self.html().encode(errors=PLAIN).decode())
         return Path(path)
 
@@ -246,7 +246,7 @@ def _bar(kind: str, share: float) -> str:
 
 
 def _force(value: float | None) -> str:
-    return '' if value is None or value != value else plain(value)
+    return '' if value is None or value != value else measured(value)
 
 
 @cache

@@ -64,15 +64,20 @@ def as_fitted(value: float, std: float, unit: str, scale: float, size: float | N
 
 def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:
     """Return an effort with as many digits and its unit, never as a power of ten."""
-    return f'{plain(value, digits)} {unit}'
+    return f'{measured(value, digits)} {unit}'
 
 
 def plain(value: float, digits: int = 3) -> str:
     """Return a number with so many digits, never as a power of ten; 0 below `RESOLVED`."""
+    text = measured(value, digits)
+    return text.rstrip('0').rstrip('.') if '.' in text else text
+
+
+def measured(value: float, digits: int = 3) -> str:
+    """Return a measured number as `plain` does, with zeros at its end: they are known digits."""
     if not isfinite(value) or abs(value) < RESOLVED:
         return f'{value:g}' if not isfinite(value) else '0'
-    text = f'{value:.{_decimals(value, digits)}f}'
-    return text.rstrip('0').rstrip('.') if '.' in text else text
+    return f'{value:.{_decimals(value, digits)}f}'
 
 
 def rounded_as(value: float, other: float, sign: str = '') -> str:
@@ -105,16 +110,16 @@ def change(before: float, after: float, unit: str = 'N') -> str:
         return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
                 'after)')
     digits = digits_apart(before, after)
-    first, second = in_unit(before, unit, digits), in_unit(after, unit, digits)
+    first, second = measured(before, digits), measured(after, digits)
     if first == second:  # six digits do not show it
         return f'falls from {in_unit(before, unit)} by less than 0.001%'
-    return f'falls from {first} to {second}'
+    return f'falls from {first} {unit} to {second} {unit}'
 
 
 def fall(before: float, after: float) -> str:
     """Return two efforts as `A → B`, with as many digits as show their difference."""
     digits = digits_apart(before, after)
-    return f'{plain(before, digits)} → {plain(after, digits)}'
+    return f'{measured(before, digits)} → {measured(after, digits)}'
 
 
 def digits_apart(before: float, after: float) -> int:
