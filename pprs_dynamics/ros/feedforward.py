@@ -184,7 +184,7 @@ class FeedforwardNode(ManagedNode):
             self._reject(Rejection.of(error))
             return
         self._command(answer)
-        # What is left may take its time: the drives have their command.
+        # The rest is not urgent: the drives have their command.
         self._compute_time.append(time.perf_counter() - began)
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
@@ -226,10 +226,10 @@ class FeedforwardNode(ManagedNode):
             self._sent = drives if left > -timeout * NANOSECONDS else None
             self._controller.sent(drives.drive_motion[0], left / NANOSECONDS,
                                   not drives.ends_at_rest)
-        for name, each in self._parts.items():
-            if each.get_subscription_count():
-                each.publish(joint_state(request.first_stamp, self._feedforward.part(answer, name),
-                                         names=self._names))
+        for name, topic in self._parts.items():
+            if topic.get_subscription_count():
+                topic.publish(joint_state(
+                    request.first_stamp, self._feedforward.part(answer, name), names=self._names))
 
     def _report_condition(self, answer: ForceCommand) -> None:
         node_values, report, now = self._settings.node_values, self._status.report, time.monotonic()
@@ -372,7 +372,7 @@ class FeedforwardNode(ManagedNode):
             self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'
         if not self._sent.ends_as(held):
-            # Where it stands: beyond the last pose, where it was given a stop.
+            # At its present position: beyond the last pose, if a stop was added to the path.
             self._send_hold(DriveTrajectory.holding(self._sent.drive_motion, held.effort))
         return ''
 
@@ -381,7 +381,7 @@ class FeedforwardNode(ManagedNode):
     def _refresh(self) -> None:
         """Update the content that is published once a second."""
         if self._last_unchecked is not None and self._status.content.code == 'OK':
-            # Nothing came after it: where it leads to is told all the same.
+            # No message followed: its margins are still to be reported.
             self._report_condition(self._last_unchecked)
         accepted, passed, now = (self._counters['accepted'], self._counters[PASSED_OVER],
                                  time.monotonic())

@@ -140,7 +140,7 @@ class LiveStream:
                     self._begins_anew = self._cannot_begin = False
                 compared = self.comparison.evaluate()
         except PprsError as error:
-            # An effect that failed may have left its memory half advanced.
+            # The memory of an effect that failed may be half advanced.
             self._begins_anew |= isinstance(error, EffectError)
             self.trouble = Rejection.of(error)
             self._reject(self.trouble)

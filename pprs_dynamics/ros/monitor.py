@@ -71,7 +71,7 @@ NOTHING: dict[str, Any] = {'effects': [], 'withdrawn': [], 'confirmed': False, '
                            'since': None, 'text': '', 'window': None}
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
 FEW = 0.5
-ENOUGH = 20  # samples in a second, whose share says anything
+ENOUGH = 20  # samples in a second from which their compared share is reported
 LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 

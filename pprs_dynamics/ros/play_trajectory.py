@@ -37,7 +37,7 @@ from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.simulation.injection import draw_motion
 from pprs_dynamics.simulation.motion_files import read_poses
 
-# Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
+# Fast DDS asks subscribers every 3 s what they have received; they do not report it unasked.
 ACKNOWLEDGED = Duration(seconds=4.0)
 EXCITATION = 'excitation'
 SOURCES = ('helix', EXCITATION, 'csv')
@@ -101,7 +101,7 @@ class PlayTrajectoryNode(Node):
         if self._next == 0 and self._round == 1 and not self._publisher.get_subscription_count():
             return
         now = self.get_clock().now().nanoseconds
-        # A timer leaves out what it was late for; the stamps behind it would stay late for good.
+        # A timer skips the periods that it missed; all later stamps would then be late.
         for beat in self._beats.due(now):
             self._play(beat)
 
@@ -109,8 +109,7 @@ class PlayTrajectoryNode(Node):
         """Publish the next message, which belongs to a moment [ns]."""
         if self._next == len(self._motion):
             if self._round == self._repeat:
-                # Leave only when the last message has arrived; but a listener that is stuck must
-                # not keep this node from ending.
+                # End when the last message has arrived, but do not wait for a stuck subscriber.
                 if not self._publisher.wait_for_all_acked(ACKNOWLEDGED):
                     self.get_logger().warning('a listener did not take the last messages')
                 self.get_logger().info(f'played {self._round * len(self._motion)} messages')

@@ -50,8 +50,8 @@ def run_node(factory: Callable[[], Node],
     try:
         node = factory()
         executor.add_node(node)
-        # What stands now stays: the garbage collector need not walk through a quarter of a
-        # million objects in the middle of a control cycle, nor now.
+        # These objects are permanent: the garbage collector need not visit a quarter of a
+        # million of them in the middle of a control cycle, nor now.
         gc.freeze()
         gc.enable()
         executor.spin()

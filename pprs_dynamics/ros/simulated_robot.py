@@ -89,7 +89,7 @@ class SimulatedRobotNode(Node):
         self._period = round(conversions.NANOSECONDS / node_values['rate'])
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
         self._late_before, self._cycles_before = 0, 0
-        # What is hidden is told to nobody who only listens: the log is the robot's own.
+        # Hidden effects are in the log only, and on no topic.
         self._status = StatusReporter(
             self, self._counters, f'simulated {hardware_of(self._model)}')
         self._states = publisher(self, JointState, 'joint_states')
@@ -101,7 +101,7 @@ class SimulatedRobotNode(Node):
             f'{node_values["bandwidth"]:g} Hz, injected: {self._injected()}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
-        # How far the simulation has fallen behind the clock for good, where it could not keep up.
+        # Time by which the simulation is permanently behind the clock, where it was too slow.
         self._lag = 0.0
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
@@ -139,7 +139,7 @@ class SimulatedRobotNode(Node):
             self._lag += behind
             if behind < 0:
                 self._queue.clear()
-        # A few at a time: commands must get through even where the machine cannot keep up.
+        # A few cycles at a time, so that commands are read even on a machine that is too slow.
         for _ in range(CYCLES_AT_ONCE):
             late = self._now() - self._lag - self._robot.time
             if late < 0:

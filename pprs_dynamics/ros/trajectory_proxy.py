@@ -55,7 +55,7 @@ from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
 
-# Of the feedforward node's parameters, those that say what may go out.
+# Parameters of the feedforward node that limit the efforts.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
 ACTION = node_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
                         'action of the controller that receives the goals', stays=True)
@@ -63,8 +63,8 @@ TIMEOUT = node_parameter('controller_timeout', 5.0, 'silence of the controller a
                          'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
-# [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the
-# controller holds the effort of the very last point until it is told another.
+# [s] after the last point of a goal in which the effort of its inertia fades: the controller
+# applies the effort of the very last point until it gets another.
 SETTLING = 0.02
 # Share of a goal's motion before the end of which the answer that it is reached is not believed;
 # a controller's clock and its last cycles take less.

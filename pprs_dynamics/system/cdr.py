@@ -71,11 +71,11 @@ class Walk:
         """Skip a sequence of texts and return their places."""
         return [self.text() for _ in range(self.count())]
 
-    def numbers(self, each: int = 1) -> None:
-        """Skip a sequence of elements that are `each` numbers of 8 bytes."""
+    def numbers(self, width: int = 1) -> None:
+        """Skip a sequence of elements that are `width` numbers of 8 bytes."""
         count = self.count()
         if count:
-            self.over(8 * each * count, 8)
+            self.over(8 * width * count, 8)
 
     def header(self) -> None:
         """Skip a header and the names of joints."""

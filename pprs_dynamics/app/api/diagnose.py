@@ -394,9 +394,9 @@ class DiagnosisResult(Result):
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
         return data_frame([
-            {'effect': found.name, 'parameter': key, 'value': each.value, 'std': each.std,
-             'unit': each.unit, 'evidence': found.evidence}
-            for found in self.effects for key, each in found.parameters.items()])
+            {'effect': effect.name, 'parameter': key, 'value': estimate.value,
+             'std': estimate.std, 'unit': estimate.unit, 'evidence': effect.evidence}
+            for effect in self.effects for key, estimate in effect.parameters.items()])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""

@@ -272,7 +272,7 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
         sure = [reading for reading in readings if reading.scales and reading.kind in SURE_KINDS
                 and corrected.isdisjoint((reading.kind, drive) for drive, _, _ in reading.scales)]
         if not sure:
-            # What a line can say of efforts that are no measurement is a question as well.
+            # Lines for efforts that are no measurement are questions as well.
             draft.questions += [
                 mistake.what + ''.join(f': if so, write {line}' for line in lines_of([mistake]))
                 for mistake in mistakes if isinstance(mistake, OtherReading) or lines_of([mistake])]
@@ -559,7 +559,7 @@ def _comment(key: str, value: Any) -> str:
 def _yaml(value: Any) -> str:
     """Return a value in one line of YAML."""
     if isinstance(value, Mapping):
-        return '{' + ', '.join(f'{scalar(key)}: {_yaml(each)}' for key, each in value.items()) + '}'
+        return '{' + ', '.join(f'{scalar(key)}: {_yaml(item)}' for key, item in value.items()) + '}'
     if isinstance(value, list):
         return '[' + ', '.join(map(_yaml, value)) + ']'
     return f'{value:.12g}' if isinstance(value, float) else scalar(value)

@@ -159,7 +159,7 @@ class Inputs:
         except UnreadableFileError:
             if not self.topic:
                 raise
-            # Of several that it may hold.
+            # The file may contain several topics.
             more = Inputs.of(self.model, path, topic=self.topic, as_it_is=self.as_it_is)
         _refuse_repeats(more.recordings, [*self.fitted, *self.held_out], ONCE)
         if self.reference is not None:

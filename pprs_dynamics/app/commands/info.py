@@ -137,8 +137,8 @@ def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
                 ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
                 ('current' if current else 'effort', found.effort,
                  'A' if in_amperes else units.effort, columns.effort_scale),
-                *((name, each, units.of(CHANNELS[name]), 1.0)
-                  for name, each in found.channels.items())):
+                *((name, bounds, units.of(CHANNELS[name]), 1.0)
+                  for name, bounds in found.channels.items())):
             if bounds is not None:
                 column = columns.names.get(quantity, f'{joint}/{quantity}')
                 scale = f', {factor:.4g} of the column' if factor != 1 else ''

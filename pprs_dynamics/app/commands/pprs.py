@@ -102,7 +102,7 @@ def _ended(given: Sequence[str]) -> int:
         if is_assumed:
             print(NO_MODEL)
     except PprsError as error:
-        # What other packages and files say may hold what a terminal would obey.
+        # Messages of other packages and files may contain control characters.
         text = displayed(error)
         if is_assumed and '`pprs init ' in text:  # the recording is of another robot
             text += "; no --model is given, and --demo takes that of the paper's robot"

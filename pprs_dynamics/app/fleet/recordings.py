@@ -23,7 +23,7 @@ from pprs_dynamics.measurement.files.recording import ENDINGS
 from pprs_dynamics.system.files import new_file
 
 AUTO = 'auto'  # effects of a survey that diagnoses
-MODEL = 'model'  # stands for the effect in rows of the model's own numbers
+MODEL = 'model'  # in place of an effect, in rows of the model's numbers
 
 TEXT, NUMBER = 'string', 'float64'
 # Types of pandas by name; docs/fleets.md has units and meanings.

@@ -21,7 +21,7 @@ LINES = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 POINTS = 1500  # pairs of extremes shown per curve; a screen has fewer columns
 MARGIN = {'l': 70, 'r': 15, 't': 30, 'b': 40}
 LEGEND = {'orientation': 'h', 'y': 1.02, 'x': 0.0, 'yanchor': 'bottom', 'xanchor': 'left'}
-# The unit stands at the last tick and in what the cursor shows.
+# The unit is at the last tick and in the cursor's text.
 SECONDS = {'ticksuffix': ' s', 'showticksuffix': 'last', 'hoverformat': '.3f'}
 
 

@@ -390,7 +390,7 @@ def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
     """Return times and curves of all segments at the same samples, with breaks between them."""
     at = shown_samples(residuals, *values)
     is_break = at < 0
-    # A screen shows no more than single precision holds.
+    # Single precision is enough for a screen.
     curves: list[Any] = [np.where(is_break, np.nan, value[at]).astype(np.float32)
                          for value in values]
     return residuals.time[np.where(is_break, np.roll(at, 1), at)], *curves

@@ -24,7 +24,7 @@ LOGGED_EVERY = 10.0  # [s] between lines of progress in a log
 
 def console(**options: Any) -> Any:
     """Return rich's console, or raise MissingLibraryError."""
-    _rich('console')  # or says what is missing
+    _rich('console')  # or raises MissingLibraryError
     from rich.console import Console
 
     class PlainConsole(Console):

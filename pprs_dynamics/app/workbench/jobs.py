@@ -112,7 +112,7 @@ class Job(Generic[Result]):
         self._changed()
 
 
-run_in_process = partial(run, niceness=2)  # whoever clicks comes first
+run_in_process = partial(run, niceness=2)  # answers to the page have priority
 Progress = Callable[[float], None]
 
 

@@ -219,7 +219,7 @@ class TickFits:
             return found
         return self.fits.held(found, found.fit.index_of(blocks), np.array(values))
 
-    # What a set says
+    # Values of a set
 
     def residual(self, found: CandidateSet) -> Array:
         """Return the residual of the linear fit, (M, D) [N]."""
@@ -262,7 +262,7 @@ class TickFits:
             fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
-        # The fitted delay, not the apparent one, says which efforts are of motion before a segment.
+        # By the fitted delay, not the apparent one, efforts belong to motion before a segment.
         residual = (measure_residuals(model, self.recordings)[0].error if self.since is None
                     else self.measured - fits.design.exact_forces(model))
         return model, residual, parameters

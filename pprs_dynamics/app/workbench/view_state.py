@@ -232,13 +232,13 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], fits: TickFits,
     known = {parameter.name: parameter for parameter in effect.parameters}
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
-    for key, each in view.estimates.get(effect.name, {}).items():
+    for key, estimate in view.estimates.get(effect.name, {}).items():
         drive, name = effect.place_and_parameter(key)
         unit = units.get(drive, DriveUnits())
         parameter = known[name].of(unit.turns)
         rows.append({
-            'key': key, 'symbol': parameter.symbol, 'value': finite(each.value),
-            'std': finite(each.std), 'description': parameter.description,
+            'key': key, 'symbol': parameter.symbol, 'value': finite(estimate.value),
+            'std': finite(estimate.std), 'description': parameter.description,
             'unit': unit.of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,

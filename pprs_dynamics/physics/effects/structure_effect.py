@@ -57,10 +57,10 @@ class StructureEffect(CatalogueEffect):
             Mass of all that the robot moves [kg].
         """
         stand_ins = {name for group in alike for name in group[1:]}
-        each = [cls.of_place(place, place[0] in stand_ins, moved) for place in places]
+        bodies = [cls.of_place(place, place[0] in stand_ins, moved) for place in places]
         return type(cls.__name__, (cls,), {
-            'places': places, 'linear': tuple(p for linear, _ in each for p in linear),
-            'variants': tuple(names for _, variants in each for names in variants),
+            'places': places, 'linear': tuple(p for linear, _ in bodies for p in linear),
+            'variants': tuple(names for _, variants in bodies for names in variants),
             'alike': alike, '__module__': cls.__module__,
             'made_by': (cls.at_places, (places, alike, moved))})
 

@@ -171,7 +171,7 @@ class JointMotion:
         return replace(self, position=self.position[samples], velocity=self.velocity[samples],
                        acceleration=self.acceleration[samples],
                        time=None if self.time is None else self.time[samples],
-                       channels={name: each[samples] for name, each in self.channels.items()})
+                       channels={name: values[samples] for name, values in self.channels.items()})
 
     def with_time(self, time: ArrayLike) -> Self:
         """Return the motion at given times."""

@@ -19,7 +19,7 @@ from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 
 PATIENCE = 1.0  # [s] for messages with the other drives; so far apart may stamps be, too
-STEPS = 15  # samples before the present one that tell the period of a drive
+STEPS = 15  # samples before the present one that give the period of a drive
 
 
 class MeasuredState(NamedTuple):
@@ -64,7 +64,7 @@ class MeasuredStates:
         message = message_in(data, JointState)
         now, stamp = self._clock(), nanoseconds(message.header.stamp)
         if (silent := now - self._read_last) > PATIENCE:
-            # Nothing came, or nobody read: this tells nothing of single drives.
+            # No message came, or none was read: single drives cannot be judged.
             self._heard = {joint: heard + silent for joint, heard in self._heard.items()}
             self._whole += silent
         self._read_last = now

@@ -73,12 +73,12 @@ class PointLayout:
         at = self._before = 1 + (empty + 1) % 2
         words: list[tuple[int, int]] = []
         columns: list[int] = []
-        for k, (count, each) in enumerate(zip(counts, numbers, strict=True)):
+        for k, (count, width) in enumerate(zip(counts, numbers, strict=True)):
             if k:
                 words.append((at, count))
                 at += 2
-            columns += range(at, at + 2 * each)
-            at += 2 * each
+            columns += range(at, at + 2 * width)
+            at += 2 * width
         words += [(at + k, 0) for k in range(empty)]
         self._first, self._columns, self._time = counts[0], np.array(columns), at + empty
         places, lengths = np.array(words, '<u4').T

@@ -21,9 +21,9 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.ros.force_command import STILL, DriveTrajectory, ForceCommand
 from pprs_dynamics.ros.messages.conversions import LARGEST
 
-STATE_TOPIC = 'controller_state'  # beside the controller's joint_trajectory
+STATE_TOPIC = 'controller_state'  # in the namespace of its joint_trajectory
 LOOKED_BACK = 1.0  # [s] of what was sent and of where the controller went
-# [s] that a controller does not follow before it is told, and that none is heard of.
+# [s] without following, or without a state, before a fault is reported.
 PATIENCE = 0.5
 # Share of the way of a joint that moves: nearer to what was sent a controller follows, and one
 # whose reference makes less of the way stands.

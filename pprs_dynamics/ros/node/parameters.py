@@ -71,7 +71,7 @@ class NodeParameter(Key):
     def check(self, value: Any) -> Any:
         """Return the value in the default's type, or raise ModelError."""
         if self.size is not None and value is None:
-            return ()  # as ROS 2 tells an empty list
+            return ()  # ROS 2 gives None for an empty list
         if isinstance(self.default, int):
             # true is a whole number to Python.
             if (not isinstance(value, type(self.default))

@@ -27,7 +27,7 @@ MEASURED = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Of setpoints the latest count: after a standstill those that waited would be executed in one
 # burst, seconds late. A hiccup of 20 ms at 500 Hz loses none.
 SETPOINTS = QoSProfile(depth=10)
-# Reliable, and the last one is kept for whoever comes later.
+# Reliable; a subscriber that joins later gets the last message.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 POLICIES = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,

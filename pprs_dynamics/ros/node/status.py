@@ -30,8 +30,8 @@ except ImportError:
 WINDOW = 1000  # durations that are summed up
 LOG_PERIOD = 1.0  # [s] between lines of one code
 # On /diagnostics STALE is the word of an aggregator that hears nothing: a stream that broke off is
-# an error that the node tells.
-TOLD_AS = {'STALE': 'ERROR'}
+# an error that the node reports.
+REPORTED_AS = {'STALE': 'ERROR'}
 
 
 @dataclass
@@ -180,7 +180,7 @@ class StatusReporter:
         self._publisher.publish(String(data=json.dumps(content)))
         if self._diagnostics is not None:
             status = DiagnosticStatus(
-                level=bytes([LEVELS.index(TOLD_AS.get(level, level))]),
+                level=bytes([LEVELS.index(REPORTED_AS.get(level, level))]),
                 name=self._node.get_fully_qualified_name(),
                 message=f'{code}: {message}', hardware_id=self.content.robot,
                 values=[KeyValue(key=key, value=str(value))

@@ -200,7 +200,7 @@ class Hub:
         while not self.is_over:
             if not self._work.wait(IDLE):
                 if is_unjudged and self.session is not None:
-                    # Units and signs of what the command line gave, once the page stands.
+                    # Check units and signs of the given recordings after the page is shown.
                     is_unjudged, change = False, self.session.ticks.change_recordings
                     self._done(partial(change, Inputs.checked))
                 self._diagnose()
