@@ -120,7 +120,7 @@ def test_the_version_is_that_of_the_package_description() -> None:
 
 
 def test_the_package_description_names_the_licence_of_all_that_is_handed_on() -> None:
-    named = {PACKAGE.parent / each.get('file', '') for each in DESCRIPTION.findall('license')}
+    named = {PACKAGE.parent / element.get('file', '') for element in DESCRIPTION.findall('license')}
     assert named == {PACKAGE.parent / 'LICENSE', *PACKAGE.rglob('*.LICENSE')}
 
 
@@ -129,5 +129,5 @@ def test_the_package_description_names_what_the_nodes_import() -> None:
             for name in imports(file)}
     others = used - set(sys.stdlib_module_names) - {'pprs_dynamics'}
     assert {'rclpy', 'sensor_msgs', 'numpy'} <= others
-    named = {each.text for each in DESCRIPTION.findall('exec_depend')}
+    named = {element.text for element in DESCRIPTION.findall('exec_depend')}
     assert {name for name in others if not {name, f'python3-{name}'} & named} == set()

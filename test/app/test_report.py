@@ -121,7 +121,7 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             found.setdefault(connection.topic, []).append((stamp, message.effort))
     content = json.loads((bag / 'said.json').read_text())
-    assert said == [content['verdict'], *(each['text'] for each in content['where'])]
+    assert said == [content['verdict'], *(place['text'] for place in content['where'])]
     assert len(said) > 1
     parts = {topic for topic in found if topic.startswith('/parts/')}
     assert parts == {'/parts/rigid_body', '/parts/active_friction', '/parts/passive_friction'}

@@ -155,8 +155,8 @@ def wrong_imports(text: str) -> Iterator[str]:
 
 def wrong(text: str) -> list[str]:
     """Return everything that a text names and that does not exist."""
-    found = [each for line in code(text) for check in (
-        wrong_commands, wrong_options, wrong_files, wrong_names) for each in check(line)]
+    found = [fault for line in code(text) for check in (
+        wrong_commands, wrong_options, wrong_files, wrong_names) for fault in check(line)]
     return [*found, *wrong_imports(text)]
 
 

@@ -275,7 +275,7 @@ def test_an_oblique_mounting_is_no_other_unit_sign_or_zero(arm: DriveModel, degr
     x, z = 9.81 * np.sin(np.radians(degrees)), -9.81 * np.cos(np.radians(degrees))
     line = f'robot: {{gravity: [{x:.1f}, 0.0, {z:.1f}]}}'
     found = find_mistakes(arm, recorded((x, z)))
-    assert all(isinstance(each, OtherReading) and each.line == line for each in found)
+    assert all(isinstance(finding, OtherReading) and finding.line == line for finding in found)
     if not found:  # the diagnosis names it
         (looks,) = {*diagnose(arm, [recorded((x, z))]).effort_looks_like.values()}
         assert looks.line == line

@@ -118,7 +118,7 @@ def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -
         candidate.name for candidate in table.best.effects}
     assert costs == sorted(costs)
     assert costs[0] == 0
-    assert [each for each, _ in found.sets[0].names] == [
+    assert [name for name, _ in found.sets[0].names] == [
         candidate.name for candidate in table.best.fitted.candidates]
     for fitted in found.sets:
         assert sum(vars(fitted.terms).values()) == pytest.approx(fitted.cost, abs=1e-6)
@@ -182,8 +182,8 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
 def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: str) -> None:
     once, twice = diagnosed(name, 1), diagnosed(name, 1, 2)
     assert possible(twice) >= set(HIDDEN[name])
-    before, after = ({f'{effect.name}.{key}': each.std for effect in found.effects
-                      for key, each in effect.parameters.items()} for found in (once, twice))
+    before, after = ({f'{effect.name}.{key}': estimate.std for effect in found.effects
+                      for key, estimate in effect.parameters.items()} for found in (once, twice))
     for key in before.keys() & after.keys():
         assert after[key] < before[key], key
 
@@ -289,14 +289,14 @@ def test_no_sentence_asks_for_the_cause_of_an_effect_that_held_out_data_refute(
     words = word_diagnosis(diagnosed_half_way(is_there))
     asks = [words.headline, words.following, words.command,
             *(f'{effect.title} {effect.what} {effect.cause}' for effect in words.effects)]
-    assert any('coulomb_friction' in each for each in asks) is is_there
+    assert any('coulomb_friction' in question for question in asks) is is_there
     assert ('what happened to the machine' in words.following) is is_there
 
 
 def of_force(hidden: Effects) -> float:
     """Return the rms of what effects add to the force along the first motion [N]."""
     motion = axis_motion(TIME, 1)
-    real, model = (each.drive_forces(motion).total for each in (axis(hidden), axis()))
+    real, model = (robot.drive_forces(motion).total for robot in (axis(hidden), axis()))
     return root_mean_square(real - model)
 
 

@@ -62,13 +62,13 @@ def _load(folder: Path, name: str, block: str) -> DriveModel:
 
 
 def efforts(model: DriveModel, *motion: Any) -> Any:
-    return model.drive_forces(JointMotion(*(np.atleast_2d(each) for each in motion))).total
+    return model.drive_forces(JointMotion(*(np.atleast_2d(values) for values in motion))).total
 
 
 def rnea(folder: Path, q: Any, v: Any, a: Any) -> Any:
     """Return the efforts of all joints of the URDF, by Pinocchio."""
     model = pinocchio.buildModelFromUrdf(str(folder / 'robot.urdf'))
-    return pinocchio.rnea(model, model.createData(), *(np.array(each, float) for each in (q, v, a)))
+    return pinocchio.rnea(model, model.createData(), *(np.array(row, float) for row in (q, v, a)))
 
 
 def random_motion(drives: int) -> Any:
@@ -192,7 +192,7 @@ def test_motors_have_the_effort_that_their_control_allows(tmp_path: Path) -> Non
     model = load_mjcf(tmp_path, THREE + motors, 'robot: {base: world, tool: u, drives: [a, b, c]}')
     assert model.robot.structure.effort == pytest.approx([50, 20, np.inf])
     remarks = model.robot.structure.description.remarks
-    assert any('servo' in each and 'controller' in each for each in remarks)
+    assert any('servo' in remark and 'controller' in remark for remark in remarks)
 
 
 @pytest.mark.parametrize(('flag', 'lost'), [

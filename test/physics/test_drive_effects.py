@@ -346,9 +346,9 @@ def with_any(name: str) -> DriveModel:
     if name == 'measured_curve':
         own = {'variable': 'position', 'from': -1.0, 'to': 1.0, 'values': [0.0, 1.0, 2.0]}
     else:
-        own = {each.name: float(np.clip(
-            0.3 if math.isinf(each.upper) or each.upper > 1 else each.upper / 2,
-            each.lower, each.upper)) for each in effect.parameters}
+        own = {parameter.name: float(np.clip(
+            0.3 if math.isinf(parameter.upper) or parameter.upper > 1 else parameter.upper / 2,
+            parameter.lower, parameter.upper)) for parameter in effect.parameters}
     place = f'{DRIVES[0]}.' if issubclass(effect, DriveEffect) or name == 'measured_curve' else ''
     return with_effects(PAPER, {name: {f'{place}{key}': value for key, value in own.items()}})
 

@@ -293,7 +293,7 @@ def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None
     """Of a 6-UPS leg_i = |x_i|, x_i from its universal joint to its ball."""
     model = DriveModel.load(robots.hexapod().write(tmp_path))
     s, rng, samples = model.robot.structure, np.random.default_rng(2), 20
-    home = model.robot.at(*(np.tile(each, (1, 1)) for each in (
+    home = model.robot.at(*(np.tile(values, (1, 1)) for values in (
         s.home[s.tables.drives], np.zeros(6), np.zeros(6))))
     P, R = home.frame_of('platform').p[0], home.frame_of('platform').R[0]
     turned = Rotation.from_matrix(R) * Rotation.from_rotvec(rng.uniform(-0.2, 0.2, (samples, 3)))

@@ -92,7 +92,7 @@ def test_efforts_are_the_models_on_every_topic(node: FeedforwardBench, model: Dr
     command = node.joint_command[-1]
     assert list(command.name) == list(arm.JOINTS)
     np.testing.assert_allclose(command.position, moved.position[0], rtol=0, atol=EQUAL)
-    np.testing.assert_allclose(sum(np.array(each[-1].effort) for each in parts.values()),
+    np.testing.assert_allclose(sum(np.array(messages[-1].effort) for messages in parts.values()),
                                command.effort, rtol=0, atol=1e-9)
     status = node.wait_for_status(code='OK', level='OK')
     assert 0 < status['workspace_margin'] < 1
@@ -123,7 +123,7 @@ def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
         assert ' N m, ' in said or ' N, ' in said
         assert len(currents) == 2
     with feedforward_bench(JointTrajectory, **parameters(file)) as node:
-        topics = [each.topic_name for each in node.node.publishers]
+        topics = [publisher.topic_name for publisher in node.node.publishers]
         assert '/feedforward/commands' in topics
         assert '/feedforward/current' not in topics
 
@@ -171,7 +171,7 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
         np.testing.assert_allclose(node.answer(message_of(motion)), forces.total[0], rtol=0,
                                    atol=EQUAL)
         assert node.bench.spin_until(lambda: node.joint_trajectory)
-        np.testing.assert_allclose([each.positions for each in node.joint_trajectory[-1].points],
+        np.testing.assert_allclose([point.positions for point in node.joint_trajectory[-1].points],
                                    forces.mechanism.position, rtol=0, atol=EQUAL)
         status = node.wait_for_status(code='OK')
         assert 0.9 < status['singularity_margin'] < 1

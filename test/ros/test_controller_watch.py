@@ -178,7 +178,7 @@ def info(publisher: bytes, number: int | None) -> dict[str, Any]:
 def test_what_later_messages_replaced_is_counted_for_each_publisher() -> None:
     senders = Senders(Clock())
     sent = [(b'a', 7), (b'a', 8), (b'a', 12), (b'b', 1), (b'a', 13), (b'b', 4), (b'b', 4)]
-    assert [senders.passed_over(info(*each)) for each in sent] == [0, 0, 3, 0, 0, 2, 0]
+    assert [senders.passed_over(info(*message)) for message in sent] == [0, 0, 3, 0, 0, 2, 0]
 
 
 def test_a_publisher_that_is_started_again_does_not_take_turns_with_the_old_one() -> None:

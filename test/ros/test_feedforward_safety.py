@@ -106,7 +106,7 @@ def test_a_stale_command_is_acted_on_once_and_the_next_message_recovers(action: 
             assert node.answer(message_of(MOTION)) == answer
             # Soon it is stale again: the status that passed counts.
             assert node.bench.spin_until(
-                lambda seen=seen: 'OK' in [each['code'] for each in node.bench.status[seen:]])
+                lambda seen=seen: 'OK' in [status['code'] for status in node.bench.status[seen:]])
 
 
 @pytest.mark.parametrize('action', ['hold_gravity', 'zero'])

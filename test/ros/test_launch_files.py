@@ -31,10 +31,10 @@ def described(name: str, monkeypatch: pytest.MonkeyPatch, **given: str,
     install(monkeypatch)
     found = runpy.run_path(str(PROJECT / 'launch' / f'{name}.launch.py'))
     actions = found['generate_launch_description']().arguments[0]
-    declared = {each.arguments[0]: each.options for each in actions
-                if type(each).__name__ == 'DeclareLaunchArgument'}
+    declared = {action.arguments[0]: action.options for action in actions
+                if type(action).__name__ == 'DeclareLaunchArgument'}
     values = {key: options.get('default_value') for key, options in declared.items()}
-    opaque, = (each for each in actions if type(each).__name__ == 'OpaqueFunction')
+    opaque, = (action for action in actions if type(action).__name__ == 'OpaqueFunction')
     return declared, opaque.options['function']({**values, **given})
 
 
@@ -54,14 +54,14 @@ def test_a_launch_file_starts_its_nodes_with_parameters_that_they_have(
         _, actions = described(name, monkeypatch, model=MODEL, namespace='cell')
         assert '__ns:=/cell' in actions[0].options['cmd']
         return
-    nodes = {each.options['executable']: each for each in actions}
-    assert {key: type(each).__name__ == 'LifecycleNode' for key, each in nodes.items()} == (
+    nodes = {action.options['executable']: action for action in actions}
+    assert {key: type(node).__name__ == 'LifecycleNode' for key, node in nodes.items()} == (
         STARTED[name])
-    for key, each in nodes.items():
+    for key, node in nodes.items():
         assert callable(getattr(executables, key))
-        assert each.options['package'] == 'pprs_dynamics'
-        assert each.options['namespace'].arguments == ('namespace',)
-        file, *given = each.options['parameters']
+        assert node.options['package'] == 'pprs_dynamics'
+        assert node.options['namespace'].arguments == ('namespace',)
+        file, *given = node.options['parameters']
         assert file == MODEL
         names = {parameter for values in given for parameter in values}
         assert 'use_sim_time' in names
@@ -75,5 +75,5 @@ def test_a_file_that_is_not_there_is_a_sentence(name: str, monkeypatch: pytest.M
 
 
 def test_every_launch_file_is_tried() -> None:
-    assert {each.name.partition('.')[0] for each in (PROJECT / 'launch').iterdir()
-            if each.name.endswith('.launch.py')} == STARTED.keys()
+    assert {file.name.partition('.')[0] for file in (PROJECT / 'launch').iterdir()
+            if file.name.endswith('.launch.py')} == STARTED.keys()

@@ -272,8 +272,8 @@ def test_a_change_is_told_within_two_windows() -> None:
         assert running.spin_until(future.done, 20.0)
         assert future.result().success, future.result().message
 
-        def offset(each: Any) -> float:
+        def offset(owner: Any) -> float:
             name = 'effects.effort_offset.lift_1.force'
-            return float(each.get_parameter(name).value) if each.has_parameter(name) else 0.0
+            return float(owner.get_parameter(name).value) if owner.has_parameter(name) else 0.0
         assert running.spin_until(lambda: abs(offset(node) - CHANGE) < 0.2, 20.0)
         assert offset(feedforward) == offset(node)

@@ -180,7 +180,7 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
         while clock.now - start < lasts - 0.1:
             clock.tick(0.5 * SELDOM, SELDOM)
         # In the middle of the path nothing but the answer to the message has gone out.
-        assert [len(each) for each in (cell.commands, cell.setpoints, cell.trajectories)
+        assert [len(messages) for messages in (cell.commands, cell.setpoints, cell.trajectories)
                 ] == [1, 1, 1]
         while len(cell.commands) == 1 and clock.now - start < 2 * lasts:
             clock.tick(0.5 * SELDOM, SELDOM)

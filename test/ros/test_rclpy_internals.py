@@ -47,11 +47,11 @@ def test_no_attribute_of_a_node_takes_the_place_of_rclpys() -> None:
     def nodes(path: Path) -> dict[str, set[str]]:
         """Return the private attributes that each class of nodes in a file sets."""
         found = {}
-        for each in ast.walk(ast.parse(path.read_text())):
-            if isinstance(each, ast.ClassDef) and (each.name == 'Node' or any(
-                    'Node' in ast.unparse(base) for base in each.bases)):
-                found[each.name] = {
-                    node.attr for node in ast.walk(each)
+        for definition in ast.walk(ast.parse(path.read_text())):
+            if isinstance(definition, ast.ClassDef) and (definition.name == 'Node' or any(
+                    'Node' in ast.unparse(base) for base in definition.bases)):
+                found[definition.name] = {
+                    node.attr for node in ast.walk(definition)
                     if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
                     and ast.unparse(node.value) == 'self' and node.attr.startswith('_')}
         return found

@@ -168,7 +168,7 @@ def test_a_clock_that_is_set_back_does_not_stop_the_robot() -> None:
             for moment in np.arange(first, last, 0.02):
                 clock.publish(Clock(clock=conversions.time(round(moment * 1e9))))
                 running.spin_for(0.01)
-            return [conversions.nanoseconds(each.header.stamp) for each in robot.states[before:]]
+            return [conversions.nanoseconds(state.header.stamp) for state in robot.states[before:]]
 
         run(500.0, 501.0)
         stamps = run(3.0, 5.0)

@@ -34,8 +34,8 @@ Names = dict[str, set[str]]
 
 def allowed(node: str) -> Names:
     """Return what the policy allows a node, by kind, with full names as SROS2 resolves them."""
-    profile, = (each for each in ElementTree.parse(POLICY).iter('profile')
-                if each.get('node') == node)
+    profile, = (candidate for candidate in ElementTree.parse(POLICY).iter('profile')
+                if candidate.get('node') == node)
     found: Names = {kind: set() for kind in (*KINDS.values(), 'execute', 'call')}
     for group in profile:
         for right in group.attrib:
@@ -81,13 +81,13 @@ def test_the_policy_allows_what_nodes_have() -> None:
             rights, has = allowed(node.get_name()), present(running, node)
             for kind, names in has.items():
                 beyond = {name for name in names
-                          if not any(fnmatch(name, each) for each in rights[kind])}
+                          if not any(fnmatch(name, pattern) for pattern in rights[kind])}
                 assert not beyond, (node.get_name(), kind, beyond)
 
 
 def test_every_node_has_an_enclave_of_its_own() -> None:
-    enclaves = [each.get('path') for each in ElementTree.parse(POLICY).iter('enclave')]
-    nodes = [each.get('node') for each in ElementTree.parse(POLICY).iter('profile')]
+    enclaves = [enclave.get('path') for enclave in ElementTree.parse(POLICY).iter('enclave')]
+    nodes = [profile.get('node') for profile in ElementTree.parse(POLICY).iter('profile')]
     assert enclaves == [f'/pprs_dynamics/{node}' for node in nodes]
     assert set(nodes) == {'feedforward', 'monitor', 'play_trajectory', 'simulated_robot',
                           'trajectory_proxy', 'workbench'}

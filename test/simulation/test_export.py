@@ -121,7 +121,7 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     assert again.drive_forces(motion).parts['rigid_body'] == pytest.approx(
         expected, abs=1e-8 * np.abs(expected).max())
     if kind == URDF:
-        assert {'ball_1', 'ball_2'} & {each[:6] for each in result['not_expressed']}
+        assert {'ball_1', 'ball_2'} & {name[:6] for name in result['not_expressed']}
         assert pinocchio.buildModelFromUrdf(str(file)).nv > 12
 
 

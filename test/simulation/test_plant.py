@@ -71,15 +71,15 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
     forces = model.drive_forces(motion).total
     plant = Plant(model)
     robot = SimulatedRobot(plant, rate=1 / TICK, control=plant.gains(7.0, 0.9), sensors=QUIET)
-    points = [Setpoint(*each) for each in zip(motion.position, motion.velocity, forces,
+    points = [Setpoint(*values) for values in zip(motion.position, motion.velocity, forces,
                                               strict=True)]
     measured = []
     for now, following in pairwise(points):
         assert robot.command(now, following)
         measured.append(robot.tick())
-    error = np.array([each.position for each in measured]) - motion.position[:-1]
+    error = np.array([sample.position for sample in measured]) - motion.position[:-1]
     assert np.abs(error).max() < 1e-3 * np.ptp(motion.position, axis=0).max()
-    missed = np.array([each.effort for each in measured]) - forces[:-1]
+    missed = np.array([sample.effort for sample in measured]) - forces[:-1]
     assert np.sqrt(np.mean(missed ** 2)) < 0.01 * plant.largest.max()
     assert not robot.notes
 
@@ -360,14 +360,14 @@ def test_a_seed_repeats_a_recording_bit_for_bit() -> None:
 
 def test_encoders_count_in_whole_steps() -> None:
     measured, true = wave(axis(dataclasses.replace(EXACT, quantisation=1e-5)), 0.6)
-    position = np.array([each.position[0] for each in measured])
+    position = np.array([sample.position[0] for sample in measured])
     np.testing.assert_allclose(position / 1e-5, np.round(position / 1e-5), atol=1e-6)
     assert np.abs(position - true[:, 0]).max() <= 0.5e-5 * (1 + 1e-9)
 
 
 def test_differentiated_velocities_follow_the_true_ones() -> None:
     measured, true = wave(axis(SensorSettings(effort_noise=0.0)), 0.5)
-    error = np.array([each.velocity[0] for each in measured]) - true[:, 1]
+    error = np.array([sample.velocity[0] for sample in measured]) - true[:, 1]
     # They lag by 2 ms behind 2 m/s^2.
     assert 1e-4 < np.sqrt(np.mean(error ** 2)) < 0.01
 

@@ -64,7 +64,7 @@ def anchors(text: str) -> set[str]:
     found: set[str] = set()
     for heading in re.findall(r'^#+ (.+?)\s*$', prose(text), re.M):
         words = re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
-        copies = sum(1 for each in found if re.fullmatch(rf'{re.escape(words)}(-\d+)?', each))
+        copies = sum(1 for anchor in found if re.fullmatch(rf'{re.escape(words)}(-\d+)?', anchor))
         found.add(f'{words}-{copies}' if copies else words)
     return found
 

@@ -39,7 +39,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('AMENT_PREFIX_PATH', '/nowhere')
     for name, classes in NAMES.items():
         module = ModuleType(name)
-        for each in classes:
-            base = LaunchConfiguration if each == 'LaunchConfiguration' else Recorded
-            setattr(module, each, type(each, (base,), {}))
+        for kind in classes:
+            base = LaunchConfiguration if kind == 'LaunchConfiguration' else Recorded
+            setattr(module, kind, type(kind, (base,), {}))
         monkeypatch.setitem(sys.modules, name, module)

@@ -46,7 +46,7 @@ def unlisted(skips: Iterable[tuple[str, str]], file: Path = LIST) -> list[tuple[
     """Return the skips, each a test's id and its reason, that no entry allows."""
     allowed = tomllib.loads(file.read_text(encoding='utf-8'))['allowed']
     return sorted({(place, reason) for place, reason in skips if not any(
-        place.startswith(each['where']) and each['skip'] in reason for each in allowed)})
+        place.startswith(entry['where']) and entry['skip'] in reason for entry in allowed)})
 
 
 def _skips(config: pytest.Config) -> list[tuple[str, str]]:
@@ -55,5 +55,5 @@ def _skips(config: pytest.Config) -> list[tuple[str, str]]:
         return []
     reporter = config.pluginmanager.get_plugin('terminalreporter')
     reports = reporter.stats.get('skipped', []) if reporter else []  # a worker reports elsewhere
-    return [(each.nodeid, str(each.longrepr[2] if isinstance(each.longrepr, tuple)
-                              else each.longrepr)) for each in reports]
+    return [(report.nodeid, str(report.longrepr[2] if isinstance(report.longrepr, tuple)
+                                else report.longrepr)) for report in reports]

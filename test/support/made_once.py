@@ -29,7 +29,7 @@ PACKAGE = Path(__file__).parents[2] / 'pprs_dynamics'
 @cache
 def folder() -> Path:
     """Return where results of the present sources are stored; those of others are removed."""
-    digest = sha256(str(sorted(f'{each.name} {each.version}' for each in distributions())).encode())
+    digest = sha256(str(sorted(f'{d.name} {d.version}' for d in distributions())).encode())
     for file in sorted(PACKAGE.rglob('*.py')):
         if file.relative_to(PACKAGE).parts[0] not in ('app', 'ros'):  # no result needs them
             digest.update(file.read_bytes())

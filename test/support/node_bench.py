@@ -50,7 +50,7 @@ class Bench:
     def connected(self) -> bool:
         """Spin until every topic listened to has its publisher, on both sides."""
         found = self.spin_until(
-            lambda: all(each.get_publisher_count() for each in self.subscriptions))
+            lambda: all(subscription.get_publisher_count() for subscription in self.subscriptions))
         # Discovery is one-sided: a publisher may see us a moment after we see it. Subscriptions
         # are announced in order, so a node that answers the latest one knows all the others.
         for topic in self._status_topics:

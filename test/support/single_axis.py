@@ -52,8 +52,8 @@ def axis_recording(model: DriveModel, seed: int = 1, noise: float = 0.1,
                    time: Array = TIME) -> Recording:
     """Return a recording of an axis, which was another one before a time [s]."""
     motion = axis_motion(time, seed)
-    force, earlier = (each.measured(each.drive_forces(motion)).total
-                      for each in (model, before or model))
+    force, earlier = (robot.measured(robot.drive_forces(motion)).total
+                      for robot in (model, before or model))
     force = np.where(time[:, None] < begins, earlier, force)
     force = force + noise * np.random.default_rng(seed).normal(size=force.shape)
     return Recording.from_arrays(f'run_{seed}', time, motion.position, None, force, (AXIS,))
