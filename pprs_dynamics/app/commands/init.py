@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
         save(plot_over_time(recordings[0].time, recording_rows(recordings[0], model.units)),
              options.picture)
         screen.print(f'picture: {shown(options.picture)}', soft_wrap=True)
-    screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
+    screen.print(f'model: {shown(options.output)} (its comments list what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     file = quote(options.output)
     if first.has_efforts:
