@@ -18,14 +18,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError, ModelError
-from pprs_dynamics.physics.mechanism.description import (
-    body_at,
-    inertial_in,
-    principal_inertia,
-)
+from pprs_dynamics.physics.mechanism.description import inertial_in, principal_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
-from pprs_dynamics.physics.mechanism.mjcf import matrix_of, readable_spec
+from pprs_dynamics.physics.mechanism.mjcf import inertial_of, readable_spec
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -186,11 +182,9 @@ class MechanismEngine:
     def carry(self, link: str, parameters: Array) -> None:
         """Add inertial parameters (10,) to a link, in the link's frame."""
         row, frame = self.structure.links[link]
-        body, model = self.links[row], self.model
-        R = matrix_of(model.body_iquat[body])
-        own = body_at(float(model.body_mass[body]), tuple(model.body_ipos[body]),
-                      R @ np.diag(model.body_inertia[body]) @ R.T)
-        self._set(body, own + inertial_in(self._frames[row].inverse @ frame, parameters))
+        body = self.links[row]
+        self._set(body, inertial_of(self.model, body) + inertial_in(
+            self._frames[row].inverse @ frame, parameters))
 
     def shift_tool(self, offset: Array) -> None:
         """Move the centre of mass of what carries the tool by an offset in the tool's axes [m]."""

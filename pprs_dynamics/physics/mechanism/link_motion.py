@@ -32,7 +32,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.state import StructureLoad
-from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure
+from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure, opening
 from pprs_dynamics.physics.mechanism.tree_equations import Data, Integers, JointFriction, Loads
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -117,9 +117,7 @@ class LinkMotion:
         sample = int(np.argmax(~np.all(size < tree.OPEN_IN_MOTION, axis=1)))
         worst = int(np.argmax(size[sample]))
         row = implied[worst]
-        by = abs(residuals[sample, worst])
-        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, tree.KIND] == tree.TRANSLATION
-                  else f'{np.degrees(by):.3g} degrees')
+        amount = opening(t.rows[row, tree.KIND], residuals[sample, worst])
         loop = self.structure.loops[t.rows[row, tree.LOOP]]
         raise WorkspaceError(
             sample, f'the loop {loop.name} is open by {amount}',

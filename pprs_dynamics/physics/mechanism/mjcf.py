@@ -182,7 +182,7 @@ class _Reader:
         at = Frame(matrix_of(model.body_quat[b]), model.body_pos[b].copy())
         first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
         name = self.bodies[b]
-        links[name] = self._inertial(b)
+        links[name] = inertial_of(model, b)
         if not count:
             joints[f'{name}_fixed'] = Joint(f'{name}_fixed', FIXED, parent, name, at,
                                             np.array([1.0, 0, 0]))
@@ -266,12 +266,6 @@ class _Reader:
                               * float(np.min(np.abs(model.actuator_ctrlrange[a]))))
         return largest
 
-    def _inertial(self, b: int) -> Array:
-        model = self.model
-        R = matrix_of(model.body_iquat[b])
-        return body_at(float(model.body_mass[b]), tuple(model.body_ipos[b]),
-                       R @ np.diag(model.body_inertia[b]) @ R.T)
-
     def _constraints(self, joints: dict[str, Joint]) -> list[Loop]:
         model, kinds = self.model, self.mujoco.mjtEq
         loops: list[Loop] = []
@@ -321,6 +315,13 @@ class _Reader:
         own, ratio = joints[self.names[a]], float(numbers[1])
         joints[own.name] = replace(own, mimic=Mimic(self.names[b], ratio,
                                                     y + float(numbers[0]) - ratio * x))
+
+
+def inertial_of(model: Any, b: int) -> Array:
+    """Return the inertial parameters of a body of a compiled model in its frame, (10,)."""
+    R = matrix_of(model.body_iquat[b])
+    return body_at(float(model.body_mass[b]), tuple(model.body_ipos[b]),
+                   R @ np.diag(model.body_inertia[b]) @ R.T)
 
 
 def matrix_of(quaternion: Array) -> Array:

@@ -165,9 +165,8 @@ class Closing:
         if np.max(worst, initial=0.0) > OPEN:
             row = int(np.argmax(worst))
             name, kind = self.loops[t.rows[row, LOOP]], t.rows[row, KIND]
-            amount = (f'{1e3 * abs(residuals[row]):.3g} mm' if kind == TRANSLATION
-                      else f'{np.degrees(abs(residuals[row])):.3g} degrees')
-            raise ModelError('robot.loops', name, f'close at home: it is open by {amount}, and '
+            raise ModelError('robot.loops', name, 'close at home: it is open by '
+                             f'{opening(kind, residuals[row])}, and '
                              'no position of the passive joints nearby closes it (check frames, '
                              'lengths, and robot.home)')
         for k, name in enumerate(self.loops):
@@ -235,6 +234,12 @@ class Closing:
             condition = float(np.linalg.cond(J_p[np.ix_(rows, chosen)]))
         held = np.setdiff1d(passive, determined)
         return Mobility(rows, determined, held, q, freedoms, condition)
+
+
+def opening(kind: int, residual: float) -> str:
+    """Return by how much a row of a loop is open, with its unit."""
+    return (f'{1e3 * abs(residual):.3g} mm' if kind == TRANSLATION
+            else f'{np.degrees(abs(residual)):.3g} degrees')
 
 
 def _rank(J: Array) -> int:
