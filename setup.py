@@ -11,13 +11,13 @@ from setuptools import find_packages, setup
 from setuptools.command.install import install
 
 package_name = 'pprs_dynamics'
-# Version, people and addresses stand in package.xml alone.
+# Version, people and addresses are in package.xml only.
 DESCRIPTION = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 MAINTAINER = DESCRIPTION.find('maintainer')
 
 
 class InstallCompiled(install):
-    """Installs, and leaves the equations compiled beside them.
+    """Installs, and compiles the equations.
 
     As `colcon build` does it. pip runs this in a folder that it packs into a wheel, where nothing
     can be left: the nodes compile at their first start then, while they answer already.

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the package is for, told with a robot that has a secret: python demo/diagnosis_demo.py.
+"""Demonstration of the loop with a hidden effect: python demo/diagnosis_demo.py.
 
-The simulated robot is given an effect, drawn at random, that its model knows nothing of. Two
-recordings later the real `pprs` commands say where the model fails and why, add what is missing,
-and the error falls, or they say that they cannot tell. What was hidden stands in a file that is
+The simulated robot gets a random effect that its model lacks, and two recordings are made. The
+`pprs` commands report where the model fails and why, and add the missing effect, so that the error
+falls; or they report that several effects are possible. The hidden effect is in a file that is
 opened at the end. Every command is printed, to be repeated by hand.
 """
 
@@ -170,7 +170,7 @@ def diagnose(story: Story) -> dict[str, Any]:
               '--report', story.file('why.html'), '--json', story.file('why.json'), '--demo')
     diagnosis = story.read('why.json')
     for names in diagnosis['indistinguishable']:
-        story.say(f'[yellow]This motion cannot tell {" from ".join(names)}.[/] The first is '
+        story.say(f'[yellow]This motion does not separate {" and ".join(names)}.[/] The first is '
                   'tried; the motion that was not fitted judges it.')
     if diagnosis['verdict'] == 'unknown':
         story.say('[yellow]Something remains that no effect of the catalogue explains.[/] It is '
@@ -184,7 +184,7 @@ def adopt(story: Story, diagnosis: dict[str, Any]) -> bool:
     names = [effect['name'] for effect in diagnosis['effects']]
     if not names:
         story.say('There is nothing to add: ' + (
-            'the model is adequate as far as this recording can tell.'
+            'the model is adequate for this recording.'
             if diagnosis['verdict'] == 'adequate' else
             'no effect of the catalogue has the form of this error. The model stays as it is.'))
         return False
@@ -254,11 +254,11 @@ def _judged(hidden: dict[str, Any], diagnosis: dict[str, Any]) -> str:
         return f'{name} was hidden, and {name} was found' + (
             f', but on {_drives(mine)} instead of {_drives(hidden)}'
             if set(mine['drives'] or ()) != set(hidden['drives'] or ()) else '') + (
-            f'; {", ".join(others)} beside it is not in the robot' if others else '') + (
+            f'; {", ".join(others)} in addition is not in the robot' if others else '') + (
             '; that something unknown remains is wrong'
             if diagnosis['verdict'] == 'unknown' else '') + '.'
     if name in rivals:
-        return f'{name} was hidden; it is among those that this motion cannot tell apart.'
+        return f'{name} was hidden; it is among those that this motion does not separate.'
     if not known and diagnosis['verdict'] == 'unknown':
         return (f'{name} was hidden, which no catalogue has, and unknown was the answer'
                 + (f'; {", ".join(found)}, which was added, is not in the robot.' if found

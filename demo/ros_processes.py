@@ -46,7 +46,7 @@ def environment(domain: int) -> dict[str, str]:
 
 
 def executable(name: str) -> str:
-    """Return the installed executable: beside this Python, where colcon put it, or on PATH."""
+    """Return the installed executable: next to this Python, where colcon put it, or on PATH."""
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
     places = (Path(sys.executable).parent,
               *(Path(prefix) / 'lib' / 'pprs_dynamics' for prefix in prefixes))

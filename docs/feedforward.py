@@ -5,7 +5,7 @@
 
 Every case runs as processes over DDS, in real time, on the helical path and on an excitation, and
 its commands once more in simulated time, in which none comes late. What is hidden in the robot is
-looked for in the recording of the excitation, and added. With --simulated nothing goes over
+looked for in the recording of the excitation, and added. With --simulated nothing goes through
 topics: what is left is the same on every machine.
 """
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Feedforward beside a controller of ros2_control, and optionally its monitor.
+"""Feedforward with a controller of ros2_control, and optionally its monitor.
 
     ros2 launch pprs_dynamics feedforward.launch.py model:=/path/robot.yaml \
       controller:=joint_trajectory_controller

@@ -89,7 +89,7 @@ class _StrictLoader(_SafeLoader):  # type: ignore[misc]
             key = key_node.value
             if key in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f'the key {key!r} stands twice', key_node.start_mark)
+                    None, None, f'the key {key!r} is given twice', key_node.start_mark)
             seen.add(key)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
         return mapping

@@ -214,7 +214,7 @@ def test_one_file_a_quantity_is_one_recording(tmp_path: Path) -> None:
     assert_read(read(folder, keys))
     assert_read(read(folder / 'tau.csv', keys))
     (folder / 'other.csv').write_text('1\n')
-    with pytest.raises(UnreadableFileError, match=r'none of t\.csv, q\.csv, tau\.csv'):
+    with pytest.raises(UnreadableFileError, match=r'match one of t\.csv, q\.csv, tau\.csv'):
         read(folder / 'other.csv', keys)
     with pytest.raises(UnreadableFileError, match=r'columns\.files\.effort names'):
         read(folder, {**keys, 'files.effort': 'torque.csv'})

@@ -19,7 +19,7 @@ export const written = ({view, window, mark, axes}) => {
   return `#${query}`;
 };
 
-/* What stands in an address that somebody may have typed; what makes no sense is not there. */
+/* Return the settings in an address, which somebody may have typed; invalid ones are left out. */
 export const read = (hash, views) => {
   const query = new URLSearchParams(hash.replace(/^#/, ''));
   const time = numbers(query.get('mark'));

@@ -37,10 +37,10 @@ const request = async (path, options) => {
 };
 
 export class Client {
-  /* `show` is called with the state before, the state now and arrays that changed; `tell` with
+  /* `show` is called with the state before, the state now and arrays that changed; `report` with
      what goes wrong. */
-  constructor(show, tell) {
-    Object.assign(this, {show, tell, state: null, heard: 0, underway: 0, isRefreshing: false});
+  constructor(show, report) {
+    Object.assign(this, {show, report, state: null, heard: 0, underway: 0, isRefreshing: false});
     this.chain = Promise.resolve(); // changes go out one after the other
   }
 
@@ -69,15 +69,15 @@ export class Client {
   }
 
   /* Ask for what is no change of the model, and show what follows. */
-  async run(path, body = {}, said = '') {
-    this.tell('');
+  async run(path, body = {}, text = '') {
+    this.report('');
     try {
       const found = await this.ask(path, body);
-      // What the work comes to may have been told by now.
-      if (said) this.tell(said, true);
+      // The result of the work may have been reported already.
+      if (text) this.report(text, true);
       this.take(found);
     } catch (error) {
-      this.tell(error.message);
+      this.report(error.message);
     }
   }
 
@@ -87,11 +87,11 @@ export class Client {
     this.chain = this.chain.then(async () => {
       try {
         const found = await this.ask(path, {...body, revision: this.state.revision});
-        this.tell('');
+        this.report('');
         answered();
         this.take(found);
       } catch (error) {
-        this.tell(error.message);
+        this.report(error.message);
         this.heard = Infinity;
       }
       this.underway -= 1;
@@ -100,7 +100,7 @@ export class Client {
     return this.chain;
   }
 
-  /* The server told its version, which an answer to a change of ours may have as well. */
+  /* The server sent its version, which an answer to a change of ours may have as well. */
   hear(version) {
     this.heard = Math.max(this.heard, version);
     return this.refresh();
@@ -115,7 +115,7 @@ export class Client {
         if (this.heard === Infinity) this.heard = found.header.version;
         this.take(found);
       } catch (error) {
-        this.tell(error.status ? error.message
+        this.report(error.status ? error.message
           : 'The workbench does not answer: was it stopped?');
         break;
       }

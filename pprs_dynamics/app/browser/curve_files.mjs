@@ -66,8 +66,8 @@ const path = (time, values, [from, to], x, y) => {
   return points.join('');
 };
 
-const text = (x, y, said, more = '') => `<text x="${x}" y="${y}" ${more}>${
-  said.replace(/&/g, '&amp;').replace(/</g, '&lt;')}</text>`;
+const text = (x, y, label, more = '') => `<text x="${x}" y="${y}" ${more}>${
+  label.replace(/&/g, '&amp;').replace(/</g, '&lt;')}</text>`;
 
 /* What is seen as a drawing with titled axes, a panel per drive. */
 export const svgOf = (seen, range) => {

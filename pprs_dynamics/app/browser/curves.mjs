@@ -135,7 +135,7 @@ export class Curves {
     return this.window || [this.time[0], this.time[this.time.length - 1]];
   }
 
-  /* What is drawn of each drive, whole; `range` says how much of it is seen. */
+  /* Curves of each drive; `range` is the part that is seen. */
   seen() {
     return this.drives.map((drive, d) => ({
       drive, unit: this.unitOf(drive), time: this.time, before: this.before[d],

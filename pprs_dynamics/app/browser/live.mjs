@@ -18,11 +18,11 @@ export const sentence = (found, unit) => {
   return [
     `error of the last 2 s ${amount(rms(found.error))} ${unit} with ${
       found.effects.map(titleOf).join(', ') || 'no added effect'}`,
-    found.monitor_error && `the monitor says ${amount(rms(found.monitor_error))} ${unit}`,
+    found.monitor_error && `the monitor reports ${amount(rms(found.monitor_error))} ${unit}`,
     `${found.kept.toFixed(0)} s kept`, found.trouble].filter(Boolean).join(' · ');
 };
 
-/* What the monitor's live diagnosis says of the robot, `null` where it is not asked for one. */
+/* Sentences of the monitor's live diagnosis; `null` without one. */
 export const changesSaid = (diagnosis) => {
   if (!diagnosis) return '';
   const gone = (diagnosis.withdrawn ?? []).map((effect) => titleOf(effect.name)).join(', ');
@@ -53,7 +53,7 @@ export class Live {
     try {
       const {machine} = await this.server.ask('live/machine');
       if (!machine) {
-        this.server.tell('No node that could be set is running.');
+        this.server.report('No node that could be set is running.');
         return;
       }
       this.asked = {change, machine};
@@ -62,7 +62,7 @@ export class Live {
       $('live-yes').textContent = verb;
       $('live-confirm').showModal();
     } catch (error) {
-      this.server.tell(error.message);
+      this.server.report(error.message);
     }
   }
 
@@ -72,11 +72,11 @@ export class Live {
     try {
       const {nodes, is_set: isSet} = await this.server.ask(change, {confirmed: machine});
       const took = change === 'live/set' ? 'took the effects' : 'has what it had';
-      $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, said]) =>
-        make('li', `${name}: ${said || took}`)));
-      this.server.tell(isSet ? '' : 'Nothing was set: the node refused.');
+      $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, reason]) =>
+        make('li', `${name}: ${reason || took}`)));
+      this.server.report(isSet ? '' : 'Nothing was set: the node refused.');
     } catch (error) {
-      this.server.tell(error.message);
+      this.server.report(error.message);
     }
   }
 

@@ -1,4 +1,4 @@
-/* What stands around the views: the verdict, the ledger, recordings, the next experiment. */
+/* Panels around the views: the verdict, the ledger, recordings, the next experiment. */
 
 import {$, button, make} from './dom.mjs';
 import {amount, plain, titleOf} from './format.mjs';
@@ -26,7 +26,7 @@ const jobLine = (job, cancel) => {
   return line;
 };
 
-/* Each job keeps its elements: a button that is replaced while it is pressed is never clicked. */
+/* The elements of each job stay: a button that is replaced while it is pressed is never clicked. */
 export const showJobs = (jobs, cancel) => {
   const running = jobs.filter((job) => job.is_running);
   for (const line of document.querySelectorAll('#jobs .job')) {
@@ -54,7 +54,7 @@ export const showVerdict = (state) => {
 };
 
 /* What an adoption came to, once: [sentence, whether it is good]. */
-export const adoptionSaid = (last, state) => {
+export const adoptionText = (last, state) => {
   const job = state.jobs?.adopt;
   if (!job || job.is_running || job.number === last?.jobs?.adopt?.number
       && !last.jobs.adopt.is_running) return null;

@@ -2,7 +2,7 @@
 
 import {css, fineContext, whenDark} from './dom.mjs';
 
-/* Blue is little, red is much: told apart by colour-blind eyes, and on both grounds. */
+/* Blue is little, red is much: colour-blind eyes distinguish them, and on both backgrounds. */
 const HEAT = [[33, 102, 172], [103, 169, 207], [209, 190, 160], [239, 138, 98], [178, 24, 43]];
 export const heat = (share) => {
   const at = Math.max(0, Math.min(share, 1)) * (HEAT.length - 1);
@@ -41,7 +41,7 @@ export class Robot {
     });
   }
 
-  /* `header` says which points lines join and which drives these are, see Skeleton. */
+  /* `header`: points that lines join, and their drives; see Skeleton. */
   use(header, arrays) {
     const {lines, face, joints, labels} = header;
     const [time, points, before, now] = ['time', 'points', 'before', 'now'].map(

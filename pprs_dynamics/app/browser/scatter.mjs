@@ -43,7 +43,7 @@ export class Scatter {
     });
     canvas.addEventListener('pointerup', () => {
       this.start = null;
-      if (this.region) this.tell();
+      if (this.region) this.report();
     });
   }
 
@@ -65,7 +65,7 @@ export class Scatter {
     this.draw();
   }
 
-  tell() {
+  report() {
     const [[x0, y0], [x1, y1]] = this.region;
     if (x0 !== x1 && y0 !== y1) {
       this.marked({x_range: [Math.min(x0, x1), Math.max(x0, x1)],

@@ -32,7 +32,7 @@ export const showShares = (asked, found, tick, see, unit = '') => {
   $('shares-of').textContent = `${found.samples} samples in ${placeOf(asked)}: error ${
     amount(found.before)} → ${amount(found.now)} ${unit}. Share of the squared error now, less the
  penalty of each effect:`;
-  const told = found.shares.filter((share) => share.net > LEAST).slice(0, MOST).map((share) => {
+  const items = found.shares.filter((share) => share.net > LEAST).slice(0, MOST).map((share) => {
     const item = make('li');
     const place = button('', (event) => tick(share.effect, event.timeStamp));
     place.title = `explains ${(100 * share.explained).toFixed(1)} % there; tick it`;
@@ -41,7 +41,7 @@ export const showShares = (asked, found, tick, see, unit = '') => {
     item.append(place);
     return item;
   });
-  $('share-list').replaceChildren(...(told.length ? told
+  $('share-list').replaceChildren(...(items.length ? items
     : [make('li', 'No effect explains it beyond its penalty.')]));
   if (!asked.time && found.spans.length) {
     $('spans').append(button(`Show when: ${found.spans.length} span${

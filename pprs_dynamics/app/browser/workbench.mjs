@@ -1,4 +1,4 @@
-/* The workbench's page: asks, shows what is answered, and says when it has been painted. */
+/* The page of the workbench: sends requests, shows answers, and marks when they are painted. */
 
 import {read, written} from './address.mjs';
 import {csvOf, save, svgOf} from './curve_files.mjs';
@@ -8,7 +8,7 @@ import {EffectList} from './effects.mjs';
 import {showErrors} from './errors.mjs';
 import {amount, titleOf, unitOf} from './format.mjs';
 import {Live} from './live.mjs';
-import {adoptionSaid, showExperiment, showFiles, showJobs, showLedger, showRecordings, showStage,
+import {adoptionText, showExperiment, showFiles, showJobs, showLedger, showRecordings, showStage,
         showVerdict} from './panels.mjs';
 import {drawScale, Robot} from './robot.mjs';
 import {Scatter} from './scatter.mjs';
@@ -36,7 +36,7 @@ const seenTabs = () => tabs.filter((tab) => !tab.hidden);
 
 /* -- showing ------------------------------------------------------------------------------ */
 
-const tell = (text, isGood = false) => {
+const report = (text, isGood = false) => {
   $('message').hidden = !text;
   $('message').textContent = text;
   $('message').classList.toggle('good', isGood);
@@ -48,7 +48,7 @@ const show = (last, state, arrays) => {
     held = {last: held ? held.last : last, state, arrays: {...held?.arrays, ...arrays}};
     return;
   }
-  if (state.failure) tell(state.failure);
+  if (state.failure) report(state.failure);
   $('live-tab').hidden = !state.has_live;
   if (state.is_empty) {
     $('verdict').textContent = state.is_beginning ? 'Reading and measuring …'
@@ -70,8 +70,8 @@ const show = (last, state, arrays) => {
     open('curves');
     curves.zoom(span);
   }, (name) => server.run('remove', {name}));
-  const said = adoptionSaid(last, state);
-  if (said) tell(...said);
+  const outcome = adoptionText(last, state);
+  if (outcome) report(...outcome);
   if (last?.revision !== state.revision || (state.is_settled && !last?.is_settled)) {
     if (mark) where(mark);
     if (view === 'scatter') loadScatter();
@@ -145,7 +145,7 @@ const where = async (asked, began) => {
   try {
     found = await server.ask('shares', asked);
   } catch (error) {
-    tell(error.message);
+    report(error.message);
     return;
   }
   if (asked !== mark) return; // forgotten, or another one
@@ -166,7 +166,7 @@ const askAbout = (asked, began = performance.now()) => {
 
 /* -- views -------------------------------------------------------------------------------- */
 
-/* A link shows what is seen here; going back in the browser leaves the page as ever. */
+/* A link shows what is seen here; going back in the browser leaves the page as usual. */
 const tellAddress = () => {
   if (wanted || !curves.before) return;
   history.replaceState(null, '', written({view, window: curves.window, mark, axes: {
@@ -211,13 +211,13 @@ const loadRobot = async () => {
     $('robot-most').textContent = `0 to ${amount(robot.most)} ${unit()}`;
     robot.moved(robot.frame);
   } catch (error) {
-    tell(error.message);
+    report(error.message);
   }
 };
 
 /* -- what there is ------------------------------------------------------------------------ */
 
-const server = new Client(show, tell);
+const server = new Client(show, report);
 const ticked = (began) => () => {
   if (began === undefined) return;
   noted(bench.latencies, began);
@@ -306,12 +306,12 @@ on('robot-error', 'change', () => {
 for (const link of document.querySelectorAll('a[download]')) {
   link.addEventListener('click', async (event) => {
     event.preventDefault();
-    tell('');
+    report('');
     try {
       const content = await server.file(link.href);
       save(link.download, content.type, content);
     } catch (error) {
-      tell(error.message);
+      report(error.message);
     }
   });
 }
@@ -319,16 +319,16 @@ for (const id of ['back', 'forward']) on(id, 'click', () => server.change(id, {}
 on('scheme', 'click', switchScheme);
 on('design', 'click', () => server.run('experiment', {
   duration: Number($('experiment-duration').value)}));
-on('invite', 'click', async () => tell(
+on('invite', 'click', async () => report(
   `For one more browser, good once: ${(await server.ask('invite', {})).address}`, true));
 const upload = async (files) => {
   for (const file of files) {
     try {
       server.take(await server.upload(file, {
         name: file.name, held_out: $('upload-held-out').checked ? '1' : '0'}));
-      tell('');
+      report('');
     } catch (error) {
-      tell(`${file.name}: ${error.message}`);
+      report(`${file.name}: ${error.message}`);
     }
   }
 };
@@ -389,5 +389,5 @@ wanted = read(location.hash, tabs.map((tab) => tab.dataset.view));
 addEventListener('hashchange', () => location.reload());
 const events = new EventSource('/api/events');
 events.onmessage = (event) => server.hear(Number(event.data));
-events.onerror = () => tell('The workbench does not answer: was it stopped?');
-events.onopen = () => tell('');
+events.onerror = () => report('The workbench does not answer: was it stopped?');
+events.onopen = () => report('');

@@ -313,9 +313,9 @@ def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
         fit = min(fits, key=lambda fit: sum(map(len, fit.groups())), default=None)
         if fit is None:
             raise UnreadableFileError(
-                path, f'it is none of {", ".join(names.values())}, of which columns.files say '
-                'that they make one recording: write * there for what recordings differ in, as '
-                'in q_*.csv')
+                path, f'its name must match one of {", ".join(names.values())}, the files of one '
+                'recording by columns.files: write * there for the part that differs between '
+                'recordings, as in q_*.csv')
         star = next(iter(fit.groups()), None)
         if len(Path(names['position']).parts) > 1:  # they may lie in folders of their own
             folder = folder.parent

@@ -90,7 +90,7 @@ class LinkMotion:
         lost = ~(self.motion.solution[:, tree.DETERMINANT] * home > 0)
         if lost.any():
             raise SingularityError(
-                int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
+                int(np.argmax(lost)), 'the motion departs from the assembly at home through a '
                 'singularity', 'the determinant of the loops must keep its sign')
         condition = self.condition
         poor = ~(condition < tree.WORST_CONDITION)

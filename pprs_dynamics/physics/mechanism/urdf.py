@@ -192,8 +192,8 @@ def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
     rubbing = [joint.get('name', '') for joint in robot.findall('joint')
                if any(_number(joint.find('dynamics'), key, 0.0) for key in DYNAMICS)]
     if rubbing:
-        yield (f'<dynamics> of {_listed(rubbing)} is not used: friction is what the model file '
-               'says, or fit finds')
+        yield (f'<dynamics> of {_listed(rubbing)} is not used: friction is that of the model '
+               'file, or of pprs fit')
     used = {name for name, joint in joints.items() if joint.reduction}
     left = [unused.name or unused.kind for unused in transmissions
             if not unused.joints or not used & set(unused.joints)]

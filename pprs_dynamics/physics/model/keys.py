@@ -207,7 +207,7 @@ def mechanism_keys(count: int) -> dict[str, Key]:
             'rad/s', positive=True, default=0.01),
         Key('friction.reversal_slide', 'width in which sgn turns over in passive slides', 'm/s',
             positive=True, default=0.001),
-        Key('robot.base', 'link that stands', is_text=True),
+        Key('robot.base', 'link that does not move', is_text=True),
         Key('robot.tool', 'link that carries the load', is_text=True),
         Key(DRIVES_KEY, 'revolute and prismatic joints that are driven', size=count, is_text=True),
         drives(GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
