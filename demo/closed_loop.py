@@ -145,7 +145,7 @@ def run_case(
 
 
 def commands_for(case: Case, path: HelicalPath | Excitation) -> np.ndarray:
-    """Return the commands that go over the topics for a path, (K, 19) as in `Tracking`."""
+    """Return the commands that are published for a path, (K, 19) as in `Tracking`."""
     times = np.arange(0.0, path.duration + 1 / RATE, 1 / RATE)
     motion = with_lead_in(path.motion(times), LEAD_IN, RATE)
     forces = DriveModel.load(case.model).drive_forces(motion)

@@ -96,7 +96,7 @@ class Story:
 
 
 def main() -> int:
-    """Tell the story and return its exit status."""
+    """Run all chapters and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
     parser.add_argument('output', nargs='?', default='output', help='folder (default output)')
     parser.add_argument('--seed', type=int, default=None, help='draws the effect; repeats a run')
@@ -179,7 +179,7 @@ def diagnose(story: Story) -> dict[str, Any]:
 
 
 def adopt(story: Story, diagnosis: dict[str, Any]) -> bool:
-    """Add what was found, and compare again; False where nothing was found or it was refused."""
+    """Add the reported effects, and compare again; False for none, and where they are refused."""
     story.chapter('Add it, and compare again')
     names = [effect['name'] for effect in diagnosis['effects']]
     if not names:

@@ -3,9 +3,9 @@
 
 """Pages of the catalogue: each effect's card, its parameters, and a plot of its law.
 
-The plot is what the effect adds to the measured effort of the drive where it adds most, along a
-random motion of the paper's robot (of a small arm where it acts in arms only, or hardly in that
-robot), with a typical value of each parameter.
+The plot shows the effect's force on the drive where it is largest, along a random motion of the
+paper's robot, with typical parameters. Effects that hardly act in that robot are plotted for a
+small arm.
 """
 
 from __future__ import annotations

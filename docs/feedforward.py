@@ -6,7 +6,7 @@
 Every case runs as processes over DDS, in real time, on the helical path and on an excitation, and
 its commands once more in simulated time, in which none comes late. What is hidden in the robot is
 looked for in the recording of the excitation, and added. With --simulated nothing goes through
-topics: what is left is the same on every machine.
+topics, so that the results are the same on every machine.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def run(path: str, seconds: float, rate: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def send(forces: np.ndarray) -> None:
-    """Stand for what your drives are commanded by."""
+    """Replace this by the function that commands your drives."""
 
 
 def main() -> None:

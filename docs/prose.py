@@ -107,8 +107,9 @@ def with_short_cells(text: str) -> str:
 
 
 def docstrings() -> Iterator[tuple[str, str]]:
-    """Yield place and text of every docstring of the package."""
-    for file in sorted((PROJECT / 'pprs_dynamics').rglob('*.py')):
+    """Yield place and text of every docstring but those of tests."""
+    folders = ('pprs_dynamics', 'benchmarks', 'demo', 'docs', 'launch')
+    for file in sorted(file for folder in folders for file in (PROJECT / folder).rglob('*.py')):
         tree = ast.parse(file.read_text(encoding='utf-8'))
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):

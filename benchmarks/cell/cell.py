@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A controller_manager with hardware of its own, nodes of the package beside it, and a probe."""
+"""A controller_manager with hardware of its own, nodes of the package, and a probe."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@
     python -m benchmarks.cell.controllers [CASE ...] [--json FILE]
 
 Runs where ros2_control, ros2_controllers and this package are installed and sourced; builds
-nothing. Hardware is the mock of ros2_control, which is where it is told to be; the case `loop`
+nothing. Hardware is the mock of ros2_control, which is where it is commanded to be; the case `loop`
 closes a loop through simulated_robot and needs joint_state_topic_hardware_interface, too.
 """
 
@@ -255,7 +255,7 @@ def two_robots() -> dict[str, Any]:
 
 
 def monitored() -> dict[str, Any]:
-    """Return what monitor says where hardware gives back what it is told, and compares of it."""
+    """Return the monitor's status where hardware returns its commands, and its comparison."""
     with cell() as running:
         trajectory_cell(running)
         efforts = Efforts(running, DRIVES)

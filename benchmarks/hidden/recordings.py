@@ -185,7 +185,7 @@ class Scene:
         return self.treat(added[LEAD:])
 
     def _model_force(self, run: Injection) -> np.ndarray:
-        """Return the forces that the model gives for the motion as it is read, (N, 6) [N].
+        """Return the forces that the model gives for the recorded motion, (N, 6) [N].
 
         An encoder that leads its drive shows in the rates above all: a play of 0.1 mm is nothing
         as a position, and a burst of acceleration at each reversal.

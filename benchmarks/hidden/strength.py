@@ -4,9 +4,9 @@
 """How strong a hidden effect is: what it adds beyond the refitted model, over the noise.
 
 Both are treated as a comparison treats them and whitened with the true covariance of the noise.
-The refitted model may move each of its numbers as far as the model file's tolerance allows, and
-no further: a payload 4 % too heavy is no effect where 5 % are allowed, and one 20 % too heavy is
-one of 15 %.
+The refitted model may change its numbers within the tolerances of the model file. With a tolerance
+of 5 %, a payload that is 4 % too heavy is no effect; one that is 20 % too heavy is an effect of
+15 %.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class Refit:
     columns : (K, M, 6) array
         See `sensitivities`.
     off : (K,) array
-        How much the robot's numbers are off already, in tolerances, -1 to 1: what is left for
+        How much the robot's numbers are off already, in tolerances, -1 to 1: the rest is for
         the refit to move is -1 - off to 1 - off.
     whitening : Whitening
     """
@@ -125,7 +125,7 @@ class Refit:
         return Ray(self, white, self._q.T @ white)
 
     def left(self, inside: np.ndarray) -> np.ndarray:
-        """Return what the refit leaves of a contribution that lies within its columns' span."""
+        """Return the residual, after the refit, of a contribution within its columns' span."""
         rows = np.vstack((self._r, self._ridge))
         wanted = np.concatenate((-inside, np.zeros(len(inside))))
         found = lsq_linear(rows, wanted, self._bounds, method='bvls').x

@@ -3,5 +3,5 @@
 
 """The naming benchmark: which physical effect is missing, asked of every method alike.
 
-README.md beside this file is the protocol.
+README.md in this folder is the protocol.
 """

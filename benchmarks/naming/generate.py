@@ -4,9 +4,9 @@
 """Problems drawn from seeds: robots of a physics engine with effects in forms of their own.
 
 The 3-PPRS comes from `benchmarks.hidden`, where the strength of an effect is what it adds beyond
-the model refitted within its tolerances. The others are simulated by MuJoCo's inverse dynamics;
-there the strength is the rms of what an effect adds to the error of the drives that feel it, over
-the standard deviation of their noise, which is made as large as the wanted strength asks.
+the model refitted within its tolerances. The others are simulated by MuJoCo's inverse dynamics.
+There the strength is the rms that an effect adds to the error of its drives, over the standard
+deviation of their noise. The noise is scaled to the wanted strength.
 """
 
 from __future__ import annotations

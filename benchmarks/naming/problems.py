@@ -128,11 +128,11 @@ class Answer:
     verdict : {'none', 'effect', 'ambiguous', 'unknown'}
     sets : tuple of tuple of Named
         Sets of missing effects, the likeliest first; the strongest effect of each first.
-        `none` has no set, `effect` one; in `unknown` what was named beside the unknown.
+        `none` has no set, `effect` one; in `unknown` the effects that are named in addition.
     seconds : float
         Processor time.
     error : str
-        With which the entrant ended instead of answering, if it did: `none` then stands for it.
+        With which the entrant ended instead of answering, if it did: the verdict is then `none`.
     """
 
     verdict: str
@@ -144,7 +144,7 @@ class Answer:
         if self.verdict not in VERDICTS:
             raise AnswerError(f'verdict is {self.verdict!r}, must be one of {", ".join(VERDICTS)}')
         if self.verdict == 'none' and any(self.sets):
-            raise AnswerError('verdict is none, and effects are named beside it')
+            raise AnswerError('verdict is none, and effects are named')
         if self.verdict in ('effect', 'ambiguous') and not (self.sets and self.sets[0]):
             raise AnswerError(f'verdict is {self.verdict}, and no effect is named')
 

@@ -56,7 +56,7 @@ class Part:
     model : str or callable
         The model file, or what writes it into a folder.
     fitted : tuple of str
-        Recordings that the base model is fitted to; by default it is taken as it is.
+        Recordings that the base model is fitted to; by default it is not fitted.
     adopted : bool
         Whether the base model gets what `--adopt-all` finds on them.
     zero : str

@@ -30,7 +30,7 @@ OFFERED = frozenset({
 
 
 def model_of(robot: str) -> Path:
-    """Return the model file of a robot, its URDF beside it under the same name."""
+    """Return the model file of a robot, and its URDF under the same name."""
     if robot == '3-PPRS':
         return ROOT / 'config' / 'paper.yaml'
     folder = ROOT / 'config' if robot in ('hexapod', 'delta') else MODELS

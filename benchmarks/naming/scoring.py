@@ -29,17 +29,17 @@ class Judged:
     named : bool or None
         All hidden effects are in one of the sets that are named.
     exact : bool or None
-        The first set is what was hidden, no more and no less, and told without doubt of an unknown.
+        The first set is what was hidden, no more and no less, and the verdict is not unknown.
     wrong_alone : bool or None
-        One set, told for sure, that has nothing of what was hidden.
+        Verdict effect, with nothing of what was hidden.
     false_alarm : bool or None
         Nothing was hidden, and something was claimed.
     unknown : bool or None
-        Something outside the catalogue was hidden and told as unknown.
+        Something outside the catalogue was hidden, and the verdict is unknown.
     drives : bool or None
         Hidden effects in the first set are on the right drives.
     covered : tuple of bool
-        For each parameter told with a deviation: the interval holds the truth.
+        For each parameter with a deviation: the interval contains the truth.
     sets : int or None
         Sets of an ambiguous answer.
     """

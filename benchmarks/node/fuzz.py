@@ -37,7 +37,7 @@ KEPT_EVERY = 20_000  # messages
 
 
 class Watch:
-    """Looks at every number that leaves the node."""
+    """Check of every number that the node publishes."""
 
     def __init__(self, limits: np.ndarray) -> None:
         self.limits, self.numbers, self.bad = limits, 0, 0

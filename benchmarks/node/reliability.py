@@ -7,7 +7,7 @@
 
 PARTs are latency, storm, restart, stall, soak, fuzz; all by default. What each found is kept in
 output/reliability, also while it runs, so that parts can be run one by one and a run that is ended
-early is not lost; the page is written from what is there. `--resume` leaves out parts that have
+early is not lost; the page is written from what is there. `--resume` skips parts that have
 been run at the size that is asked for.
 """
 

@@ -47,7 +47,7 @@ class Stream:
     node : str
         Fully qualified name of the node under test.
     has_status : bool
-        Whether it tells its status.
+        Whether it publishes its status.
     kind : type
         Message of the trajectories.
     """

@@ -87,7 +87,7 @@ def error_of(model: DriveModel, recording: Recording) -> float:
 
 
 def compared(model: DriveModel, recording: Recording) -> float:
-    """Return the relative error that `pprs compare` tells [%]."""
+    """Return the relative error of `pprs compare` [%]."""
     residuals, _ = measure_residuals(model, [recording])
     return relative(residuals.error[:, 0], residuals.measured[:, 0] - residuals.measured.mean())
 
@@ -99,7 +99,7 @@ def relative(error: np.ndarray, measured: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Story:
-    """All that the document tells."""
+    """All results of the page."""
 
     run: Recording
     pulses: Recording

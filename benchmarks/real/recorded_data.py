@@ -14,7 +14,7 @@ def find_data(name: str, file: str) -> Path | None:
     """Return the folder of a robot's recordings that has a file, None where there is none.
 
     Looked for are `name` below the folder that PPRS_DATA names, that folder itself, and
-    ../shared/data/`name` beside the project.
+    ../shared/data/`name` next to the project.
     """
     places = [Path(__file__).resolve().parents[3] / 'shared/data' / name]
     if 'PPRS_DATA' in os.environ:

@@ -210,7 +210,7 @@ def load_rows(bench: Bench) -> tuple[list[list[str]], int, int, int]:
 
 
 def ripple_rows(found: dict[str, Any]) -> tuple[list[list[str]], int]:
-    """Return pitches of ripple beside that of the gears, and how many are within 0.5 %."""
+    """Return pitches of ripple with that of the gears, and how many are within 0.5 %."""
     rows, near = [], 0
     for effect in found['effects']:
         if effect['name'] == 'force_ripple':

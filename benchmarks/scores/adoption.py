@@ -7,7 +7,7 @@
 
 Each case hides a random effect in the simulated robot and records two motions. `pprs diagnose
 --adopt-all` sees the first recording; the error of the model it writes is taken on the second,
-beside that of the best fit of the hidden effect's own form. Then `pprs adopt` is asked for an
+with that of the best fit of the hidden effect's own form. Then `pprs adopt` is asked for an
 effect that is not there, which it must refuse. Outcomes are appended to FILE as they come, and
 cases that are there are not run again. `--workers` and `--scheduler` say where cases run, as for
 `pprs survey`.

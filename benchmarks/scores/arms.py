@@ -139,7 +139,7 @@ def by_effect(told: Sequence[tuple[Outcome, dict[str, bool]]]) -> list[str]:
 
 
 def by_pair(found: Sequence[Outcome]) -> str:
-    """Return a table in Markdown of each pair: which was told right, and which as the other.
+    """Return a table in Markdown of each pair: which was named right, and which as the other.
 
     Right is first or in the named set; as the other, where the other is named and it is not.
     """

@@ -67,7 +67,7 @@ def run_changed(changed: Changed, recordings: Path) -> Outcome:
 
 
 def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
-    """Return, for each number, what is right with it halved, as it is, and doubled."""
+    """Return, for each number, the right answers with it halved, unchanged and doubled."""
     groups: dict[tuple[str, float], list[dict[str, Any]]] = {}
     for outcome in outcomes:
         if 'failed' not in outcome:

@@ -82,7 +82,7 @@ def as_told(true: Mapping[str, Any], drives: Sequence[str]) -> dict[str, Any]:
     """Return a true effect in the terms of an answer on some drives.
 
     A common shift of all three lifts' zeros moves the whole robot up and changes no force: the
-    zeros of lifts can be told only against each other, and an answer may name two of them.
+    zeros of lifts can be separated only against each other, and an answer may name two of them.
     """
     silent = [lift for lift in DRIVES[3:] if lift not in drives]
     if true['name'] != 'homing_error' or not silent:
@@ -101,7 +101,7 @@ def _keeps_an_error(outcome: Outcome) -> bool:
 
 
 def separable(outcome: Outcome) -> bool:
-    """Return whether an oracle that knows effect, drives and noise can tell it from every rival."""
+    """Return whether an oracle that knows drives and noise separates it from every rival."""
     return bool(outcome.get('oracle', {}).get('separable', True))
 
 

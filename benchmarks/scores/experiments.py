@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Does the designed motion settle what a recording leaves open? Beside a random one and a repeat.
+"""How often a designed motion decides an ambiguous verdict; a random motion and a repeat as well.
 
     python -m benchmarks.scores.experiments --seeds 10 --file experiments.jsonl
     python -m benchmarks.scores.experiments --table experiments.jsonl
@@ -9,12 +9,12 @@
 Outcomes are appended to FILE as they come, and cases that are there are not run again.
 `--workers` and `--scheduler` say where cases run, as for `pprs survey`.
 
-A robot with a hidden effect, numbers off within the model file's tolerances and noisy sensors
-makes a poor recording of 10 s: up and down only, or slow and small, with a weaker and weaker
-effect, until the diagnosis is ambiguous with the truth among the candidates. Then one
-run of 20 s is added: the designed one, a random one that uses the same limits, or the old motion
-repeated for as long. Settled is a diagnosis of both together that names the truth and holds
-nothing against it; open one that holds a rival, or names nothing.
+A robot has a hidden effect, numbers off within the model file's tolerances and noisy sensors. It
+makes a poor recording of 10 s: up and down only, or slow and small. The effect is weakened until
+the diagnosis is ambiguous with the truth among the candidates. Then one run of 20 s is added: the
+designed one, a random one that uses the same limits, or the old motion repeated for as long.
+*Settled* is a diagnosis of both together that names the truth without a rival. *Open* is one with
+a rival, or without an effect.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def times(duration: float) -> np.ndarray:
 
 
 def poor_motions(seed: int) -> dict[str, PlatformMotion]:
-    """Return motions that tell little: up and down only, and slow and small."""
+    """Return motions of little information: up and down only, and slow and small."""
     parameters = np.zeros((6, JointSeries.size(HEAVE_HARMONICS)))
     parameters[2] = np.random.default_rng((seed, 5)).normal(size=parameters.shape[1])
     parameters[2] *= HEAVE / np.abs(parameters[2]).max()

@@ -123,7 +123,7 @@ def _said(said: dict[str, Any]) -> str:
 
 
 def main() -> int:
-    """Make problems, answer them, or hold two files of answers beside each other."""
+    """Make problems, answer them, or compare two files of answers."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folder', type=Path, help='of the problems')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How small a change since a reference run is told, on an arm with forces of no catalogue.
+"""Smallest reported change since a reference run, on an arm with forces of no catalogue.
 
     python -m benchmarks.scores.reference --seeds 5 --drift 0.05 --path 1
 
@@ -9,7 +9,8 @@ A made-up arm of two turning joints and a sliding one moves along a path, 20 s, 
 worn guides that pull as no effect of the catalogue does. Of each run they are otherwise by
 `--drift` of themselves. One run, on path 0, is the reference; each other, on `--path`, has a
 change, and noise of its own.
-Told is in how many runs what was changed is first, alone, holds its value, and what is beside it.
+The table counts the runs in which the changed effect is first, is alone, and has an interval that
+contains its value; and the other reported effects.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ MODEL = '''/**:
 
 @dataclass(frozen=True)
 class Change:
-    """A change of the machine: an effect with its values, and what is told of it by name."""
+    """A change of the machine: an effect with its values, and judgement of a diagnosis."""
 
     effect: str
     key: str
@@ -108,7 +109,7 @@ def record(machine: DriveModel, seed: int, drift: float, path: int = 0) -> Recor
 
 
 def score(seeds: int, drift: float, path: int) -> list[dict[str, Any]]:
-    """Return a row for each change: how often it is told, and how sure."""
+    """Return a row for each change: how often it is reported, and how surely."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / 'made_up.urdf').write_text(URDF)
         (Path(folder) / 'arm.yaml').write_text(MODEL)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is told since a reference run of robots of the physics engine, beside what is without one.
+"""Answers since a reference run for robots of the physics engine, and answers without one.
 
     python -m benchmarks.scores.reference_robots --model config/hexapod.yaml --effects 30
     python -m benchmarks.scores.reference_robots --model ur_base.yaml --changes --power
@@ -9,9 +9,9 @@
 In every drive there are hysteresis, ripple and Stribeck friction of forms that the catalogue has
 not (`injected_forms` of the simulation), and in every passive joint of a robot with loops dry
 friction that turns over otherwise. They are the same on all days. A run on path 0 is the
-reference. Others, on `--path`, have noise of their own, and a change: of `--effects` in the place
-of the catalogue's that are drawn in turn, of `--changes` those of a table, and of `--power` the
-same by what they are over the noise. Each is diagnosed since the reference, and every `--both`-th
+reference. Others, on `--path`, have noise of their own, and a change. With `--effects` it is an
+effect of the catalogue, drawn in turn. With `--changes` it is one of a table, and with `--power`
+the same in sizes over the noise. Each is diagnosed since the reference, and every `--both`-th
 without it as well.
 
 Outcomes are appended to FILE as they come, and what is there is not run again.
@@ -73,7 +73,7 @@ class Change:
     drive : int
         -1 for all, or the structure.
     key : str
-        Of its value, as a diagnosis tells it.
+        Of its value in the diagnosis.
     value : float
         nan where it is drawn.
     over_noise : float, optional
@@ -253,7 +253,7 @@ def told(found: Diagnosis, seconds: float) -> dict[str, Any]:
 
 def outcome_of(robot: Robot, reference: Reference, change: Change, seed: int, path: int,
                both: bool) -> Outcome:
-    """Return what is told of a change with a reference and, if so asked, without."""
+    """Return the answers on a change with a reference and, on request, without."""
     run, truth = robot.record(change, seed, path)
     found: Outcome = {'name': change.name, 'effect': change.effect, 'seed': seed, 'path': path,
                       'truth': truth}

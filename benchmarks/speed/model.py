@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How fast the model is beside Pinocchio and MuJoCo: ratios from one run, with their spread.
+"""Speed of the model against Pinocchio and MuJoCo: ratios from one run, with their spread.
 
 Every figure is taken in rounds, all of a table in turn, so that a busy machine slows them alike.
 Times are those of the processor, but for what runs on two cores. A ratio is that of one round;

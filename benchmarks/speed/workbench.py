@@ -6,7 +6,7 @@
     python -m benchmarks.speed.workbench [ROUNDS [PICTURE.png]]
 
 A recording of 40 s of the simulated robot with two hidden effects; the server as a process,
-Chromium without a graphics card beside it. From the event of a click to the frame that shows its
+Chromium without a graphics card. From the event of a click to the frame that shows its
 answer, as the page itself notes it. The machine's load is printed, for it is part of the result.
 """
 

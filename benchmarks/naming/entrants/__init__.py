@@ -66,7 +66,7 @@ class Entrant:
         return replace(self, settings={**self.settings, self.tuning[0]: value})
 
     def key(self) -> str:
-        """Return what an answer depends on beside its problem: sources, settings, library."""
+        """Return the versions that an answer depends on: sources, settings, library."""
         try:
             library = version(self.library)
         except PackageNotFoundError:
@@ -114,7 +114,7 @@ PEERS: dict[str, Entrant] = {
 
 
 def _with_tuned(peers: Mapping[str, Entrant]) -> dict[str, Entrant]:
-    """Return peers by their defaults, and beside those that were tuned as they are then."""
+    """Return peers with default settings, and with tuned ones where they were tuned."""
     found = {}
     for name, peer in peers.items():
         if peer.settings.get('optimiser') == 'EvidenceGreedy' and not has_evidence_greedy():

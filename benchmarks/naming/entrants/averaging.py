@@ -4,7 +4,7 @@
 """Bayesian model averaging by BIC weights over the sets that a random walk visits.
 
 A. Raftery, Sociol. Methodol. 25 (1995) 111; D. Madigan, J. York, Int. Stat. Rev. 63 (1995) 215
-(MC3). Sets within a factor of 20 of the likeliest are told (Occam's window).
+(MC3). Sets within a factor of 20 of the likeliest are reported (Occam's window).
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ class Equations:
     whiten : bool
         Whether noise of each drive is taken as autoregressive, its order by BIC; else as white.
     found : sequence of Group
-        What is there beside the noise that is so told, by an earlier choice.
+        Groups of an earlier choice, with which the noise is estimated.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Equations:
                 (vectors[:, kept].T @ right) / root)
 
     def gains(self, chosen: Sequence[int], groups: Sequence[Group]) -> Array:
-        """Return by how much each group lowers the rest beside chosen columns."""
+        """Return by how much each group lowers the rest in addition to chosen columns."""
         at = np.asarray(chosen, dtype=int)
         inverse = (np.linalg.inv(self.gram[np.ix_(at, at)] + RIDGE * len(self.y) * np.eye(len(at)))
                    if len(at) else np.zeros((0, 0)))

@@ -20,7 +20,7 @@ RELATIVE = 0.1  # relative standard deviation, to which a parameter counts as id
 
 
 def relative_deviations(problem: Problem, limit: float = RELATIVE) -> Answer:
-    """Return what is left when all whose relative deviation is larger are dropped, worst first."""
+    """Return the columns that remain after all of larger relative deviation, worst first."""
     equations = Equations(problem)
     single = set(equations.best_single())
     chosen = [group for group in equations.groups if set(group.columns) <= single]

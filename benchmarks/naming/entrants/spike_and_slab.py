@@ -5,7 +5,7 @@
 
 E. George, R. McCulloch, J. Am. Stat. Assoc. 88 (1993) 881; Stat. Sinica 7 (1997) 339. Each effect
 at a place is absent (spike) or has one of its shapes with a g-prior (slab). PyMC and NumPyro sample
-coefficients by gradients, which inclusion has none of; with it summed out, this is what is left.
+coefficients by gradients, which inclusion does not have; here it is summed out.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@
 """A held-out F-test with control of the false discovery rate, after LISDD.
 
 "Where Is My Physics Wrong? Localized and Identifiable Discovery of Model Discrepancy" (LISDD)
-fits the physics robustly where it is right, chooses a sparse term by exhaustive holdout, and tests
-it by an F-test on a split of the sample that chose nothing, over regions with Benjamini-Hochberg.
+fits the physics robustly where it is right, and chooses a sparse term by exhaustive holdout. An
+F-test on a split of the sample that chose nothing tests it, over regions with Benjamini-Hochberg.
 Here the regions are the drives: on each, of all sets of one or two groups the one of least error
 on the second third of the time is tested on the last. Its code is not public; this is our reading.
 """

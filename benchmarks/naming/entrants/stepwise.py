@@ -4,8 +4,9 @@
 """Stepwise selection by the Bayesian information criterion, with white or whitened noise.
 
 What most people would write first: add the group that lowers BIC most, drop what raises it, until
-nothing pays. G. Schwarz, Ann. Stat. 6 (1978) 461. The noise may be told anew beside what was
-chosen, and all chosen again, as D. Cochrane and G. Orcutt do (J. Am. Stat. Assoc. 44 (1949) 32).
+nothing pays. G. Schwarz, Ann. Stat. 6 (1978) 461. The noise may be estimated again with the
+chosen groups, and all chosen again, as D. Cochrane and G. Orcutt do (J. Am. Stat. Assoc. 44
+(1949) 32).
 """
 
 from __future__ import annotations
