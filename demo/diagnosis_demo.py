@@ -30,6 +30,7 @@ from rich.markup import escape
 from rich.table import Table
 from ros_processes import executable
 
+from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -186,7 +187,7 @@ def adopt(story: Story, diagnosis: dict[str, Any]) -> bool:
         story.say('There is nothing to add: ' + (
             'the model is adequate for this recording.'
             if diagnosis['verdict'] == 'adequate' else
-            'no effect of the catalogue has the form of this error. The model stays as it is.'))
+            'no effect of the catalogue has the form of this error. The model is unchanged.'))
         return False
     data = (story.file('run.mcap'), '--validate', story.file('other.mcap'),
             '--output', story.file('adopted.yaml'), '--demo')
@@ -197,7 +198,7 @@ def adopt(story: Story, diagnosis: dict[str, Any]) -> bool:
     if status == REFUSED:
         story.say('[yellow]Refused[/], with the reason above.')
     if not (story.folder / 'adopted.yaml').exists():
-        story.say('The model stays as it is.')
+        story.say('The model is unchanged.')
         return False
     model = ('--model', story.file('adopted.yaml'))
     story.run('compare', story.file('run.mcap'), *model, '--report', story.file('after.html'),
@@ -219,8 +220,8 @@ def reveal(story: Story, diagnosis: dict[str, Any], added: bool) -> str:
     table.add_row('effect', hidden['name'], ', '.join(e['name'] for e in found) or 'nothing')
     table.add_row('on', _drives(hidden), '; '.join(_drives(effect) for effect in found) or '-')
     table.add_row('parameters', _hidden_parameters(hidden['parameters']),
-                  '\n'.join(f'{key} = {p["value"]:.4g} ± {2 * (p["std"] or 0):.2g} '
-                            f'{p["unit"]}' for effect in found
+                  '\n'.join(f'{key} = {with_uncertainty(p["value"], p["std"] or 0.0, p["unit"])}'
+                            for effect in found
                             for key, p in effect['parameters'].items() if p['value']) or '-')
     story.console.print(table)
     sentence = _judged(hidden, diagnosis)
