@@ -159,22 +159,28 @@ def test_efforts_of_another_message_join_the_joint_states(tmp_path: Path) -> Non
     assert_read(recording)
 
 
-@pytest.mark.parametrize('seed', range(3))
-def test_positions_are_those_of_the_chosen_topic_whatever_else_is_in_the_bag(
-    seed: int, tmp_path: Path,
-) -> None:
-    random = np.random.default_rng(seed)
-    late, offset = int(random.integers(0, 5_000_000)), float(random.choice([0.0, 0.5]))
-    has_velocity, has_effort = random.random(2) < 0.5
-    name = str(random.choice(['/joint_commands', '/a_first', '/robot/torque_states']))
+LATE = 3_000_000  # [ns] by which another topic comes after /joint_states
 
+
+def beside(name: str, position: tuple[float, ...] | None, has_efforts: bool, folder: Path,
+           ) -> Recording:
+    """Read a bag with efforts on another topic, where angles are half the true ones, or 0."""
     def two(k: int) -> dict[str, Any]:
-        other = message(stamp(k) + late, JOINTS, offset * POSITION[k] + offset,
-                        np.ones(2) if has_velocity else (), EFFORT[k])
+        other = message(stamp(k) + LATE, JOINTS, () if position is None else (
+            position + 0.5 * POSITION[k]), (), EFFORT[k])
         return {name: other, '/joint_states': message(
-            stamp(k), JOINTS, POSITION[k], (), () if has_effort else EFFORT[k])}
+            stamp(k), JOINTS, POSITION[k], (), EFFORT[k] if has_efforts else ())}
 
-    recording = read(ros2(tmp_path / 'bag', two))
+    return read(ros2(folder / 'bag', two))
+
+
+@pytest.mark.parametrize(('name', 'position', 'has_efforts'), [
+    ('/a_first', None, False), ('/joint_commands', (0.5, 0.5), False), ('/a_first', (0.5, 0), True),
+])
+def test_positions_are_those_of_joint_states_where_no_other_topic_has_all_that_is_needed(
+    name: str, position: tuple[float, ...] | None, has_efforts: bool, tmp_path: Path,
+) -> None:
+    recording = beside(name, position, has_efforts, tmp_path)
     stamps = np.rint(recording.time * 1e9).astype(int) + (recording.epoch - EPOCH) * 10**9
     at = np.searchsorted(np.rint(TIME * 1e9).astype(int), stamps)
     assert len(recording.time) >= N - 2
@@ -182,6 +188,13 @@ def test_positions_are_those_of_the_chosen_topic_whatever_else_is_in_the_bag(
     known = np.isfinite(recording.effort).all(axis=1)
     assert known.sum() >= N - 2
     np.testing.assert_allclose(recording.effort[known], EFFORT[at][known], atol=0.02)
+
+
+def test_the_only_topic_with_positions_and_efforts_is_read_alone(tmp_path: Path) -> None:
+    recording = beside('/robot/torque_states', (0.5, 0.5), False, tmp_path)
+    np.testing.assert_allclose(recording.position, 0.5 + 0.5 * POSITION)
+    np.testing.assert_array_equal(recording.effort, EFFORT)
+    assert 'merged' not in {finding.kind for finding in recording.findings}
 
 
 def test_efforts_on_two_other_topics_are_a_question(tmp_path: Path) -> None:

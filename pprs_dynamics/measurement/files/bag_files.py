@@ -24,6 +24,7 @@ from pprs_dynamics.measurement.files.merged_states import (
     fields_of,
     read_channels,
     read_merged,
+    states_of,
 )
 from pprs_dynamics.measurement.files.name_hints import MOST, missing_names
 from pprs_dynamics.measurement.files.samples import (
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
 LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
+# In the names of topics whose positions were commanded, not measured.
+COMMANDS = 'command', 'cmd', 'desired', 'reference', 'target', 'goal', 'setpoint'
+FIRST = 400  # messages of a topic of which one has an effort, if efforts were recorded
 STORAGE = {'.mcap': 'MCAP', '.db3': 'SQLITE3'}
 REPORTED = 8192  # messages between two reports of progress
 
@@ -74,7 +78,7 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
     named = {(field.joint, field.quantity) for field in fields}
     topics = {field.topic for field in fields}
     connections = [] if fields and all((drive, 'position') in named for drive in drives) else (
-        _chosen(bag, topic))
+        _chosen(bag, topic, drives))
     if fields:
         return read_merged(bag, [*connections, *(
             c for c in bag.connections if c.topic in topics and c not in connections)],
@@ -214,8 +218,24 @@ def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, sta
         writer.write(connection, at, typestore.serialize_cdr(message, JOINT_STATE))
 
 
-def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
-    """Return the connections of the one topic to be read."""
+def _has_efforts(bag: Bag, connections: list[Connection], drives: tuple[str, ...]) -> bool:
+    """Return whether the first messages of a topic have positions of all drives, and efforts."""
+    states = [(joint, quantity, value) for connection, _, message in bag.decoded(
+        connections, FIRST) for joint, quantity, value, _ in states_of(
+            message, connection.msgtype) if np.isfinite(value)]
+    known = {(joint, quantity) for joint, quantity, _ in states}
+    # Drivers fill what they do not measure with zeros.
+    filled = {quantity for joint, quantity, value in states if joint in drives and value}
+    return all((drive, 'position') in known for drive in drives) and {
+        'position', 'effort'} <= filled
+
+
+def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connection]:
+    """Return the connections of the one topic to be read.
+
+    That is the only one with positions and efforts, whose samples belong together; of several,
+    or none, the one that ends in `joint_states`.
+    """
     path = bag.path
     states = [item for item in bag.connections if item.msgtype == JOINT_STATE]
     topics: dict[str, list[Connection]] = {}
@@ -232,8 +252,12 @@ def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
     elif not states and len(topics) == 1:
         matching = [*topics]
     else:
-        matching = [name for name in topics if name.endswith(TOPIC_END)
-                    and channel_of(name, JOINT_STATE) is None]
+        measured = [name for name in topics if channel_of(name, JOINT_STATE) is None]
+        named = [name for name in measured if name.endswith(TOPIC_END)]
+        whole = [name for name in measured if not any(word in name.lower() for word in COMMANDS)
+                 and _has_efforts(bag, topics[name], drives)] if len(measured) > 1 else []
+        matching = whole if len(whole) == 1 else [
+            name for name in named if name in whole] or named
         # Topics that were announced and stayed silent are no choice.
         matching = [name for name in matching
                     if any(item.msgcount for item in topics[name])] or matching
