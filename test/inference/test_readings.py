@@ -98,8 +98,25 @@ def test_limits_of_a_motor_that_turns_freely_say_nothing(constant: bool, tmp_pat
     assert told(model, time, q, effort[:, None]) == ''
 
 
+@pytest.mark.parametrize('true', [1.0, 10.0])
+def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
+    true: float, tmp_path: Path,
+) -> None:
+    """A tenth of the inertia in the URDF has the same data as efforts in kgf cm."""
+    (tmp_path / 'motor.urdf').write_text(MOTOR.replace('"-6.3"', '"-2.5"').replace('"6.3"', '"2.5"'))
+    time, q, v, a = motion(np.random.default_rng(5), 1, 1.2)
+    effort = true * (0.003 * a + 0.01 * v + 0.02 * np.tanh(v / 0.05))
+    effort += np.random.default_rng(1).normal(0, 1e-3, q.shape)
+    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, q, effort]), delimiter=',',
+               comments='', header='time,pos,torque')
+    first = first_model(tmp_path / 'motor.urdf', [tmp_path / 'run.csv'], tmp_path / 'a.yaml')
+    assert not first.columns.get('motor', {}).get('effort_scale')
+    assert ('all is as the model file says' in ''.join(first.questions)) == (true != 1)
+
+
 @pytest.mark.parametrize(('factor', 'words'), [
-    (-10.197, 'in kgf cm'), (8.0, 'it looks like currents in amperes'), (1e-3, 'in kN m')])
+    (-10.197, 'in kgf cm'), (11.0, 'in kgf cm, or'), (8.0, 'it looks like currents in amperes'),
+    (1e-3, 'in kN m')])
 def test_a_common_factor_is_a_unit_only_near_its_constant(
     arm: DriveModel, factor: float, words: str,
 ) -> None:

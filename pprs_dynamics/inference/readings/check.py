@@ -225,8 +225,8 @@ class Search:
         """Return the most likely reading; mistakes are added to it until none makes it likelier."""
         first = self.rows[0]
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
-        self.start = start = self.fit(first) or Fit(first)
-        self.fits = [start]
+        self.fits = self.fits_of(first) or [Fit(first)]
+        self.start = start = self._top()
         is_inside = not self._outside(first)
         # Without masses a gravity of any size may explain positions in another unit.
         explains = is_inside and start.reading.is_plain and self.has_gain and (
@@ -243,8 +243,8 @@ class Search:
             seed = self._top()
             self.fits += [fit for row in self.rows[1:]
                           if row.kind in tried and self._may_follow(row, seed.reading)
-                          and (fit := self.fit(row.after(seed.reading))) is not None
-                          and self._is_credible(row, fit)]
+                          for fit in self.fits_of(row.after(seed.reading))
+                          if self._is_credible(row, fit)]
         return self._top()
 
     def likely(self) -> list[Fit]:
@@ -304,26 +304,23 @@ class Search:
                 found.append(fit)
         return found[:1]
 
-    def fit(self, reading: Reading) -> Fit | None:
-        """Return a reading with its best scales of efforts.
-
-        None where it cannot be.
-        """
+    def fits_of(self, reading: Reading) -> list[Fit]:
+        """Return a reading with each scale that its efforts may have; none where it cannot be."""
         excerpt = self.excerpts.get(reading.time_unit)
         if excerpt is None or (reading.kinds and not self._possible(reading, excerpt)):
-            return None
+            return []
         cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
         if not np.isfinite(excerpt.effort).any():
-            return Fit(reading, -cost, 0.0, 0.0)
+            return [Fit(reading, -cost, 0.0, 0.0)]
         evidence = self.evidence(reading)
         # A mounting without weight explains none.
         if evidence is None or (reading.gravity is not None and not evidence.has_weight):
-            return None
+            return []
         weights = self._weights(reading, excerpt, evidence)
         measured = [d for d in np.flatnonzero(weights > 0).tolist()
                     if evidence.is_measured(d, reading.efforts[d])]
         if not measured:
-            return None
+            return []
         weight = weights[measured]
 
         @cache
@@ -351,7 +348,7 @@ class Search:
         if reading.kinds & {'position_offset', 'position_unit', 'mounting'}:
             # Another weight is credible only for efforts that show weight or inertia.
             fits = [fit for fit in fits if fit.mean_prior <= table.PLAUSIBLE]
-        return max(fits, key=lambda fit: fit.score, default=None)
+        return fits
 
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
                      alone: Callable[[int, Sequence[float]], float],
@@ -372,11 +369,11 @@ class Search:
         if not all(drive.turns for drive in self.model.units):
             units = [scale for scale in units if abs(scale) != table.KGF_CM]
 
-        def is_near(scale: float, group: Sequence[int]) -> bool:
+        def is_near(scale: float, group: Sequence[int], most: float = np.inf) -> bool:
             off = np.abs(np.log(np.abs(factors[group] / scale)))
             off = off[np.isfinite(off)]
             return abs(scale) == 1 or bool(
-                len(off) and off.max() < np.log(table.OFF_IN_UNIT[abs(scale)]))
+                len(off) and off.max() < np.log(min(most, table.OFF_IN_UNIT[abs(scale)])))
 
         drives, scales, same = np.arange(len(factors)), np.ones(len(factors)), self.same_masses
         for d in measured:
@@ -402,12 +399,13 @@ class Search:
                         np.abs(np.log(factors[known] / scales[known])) < same):
                     yield scales, price + table.COST['effort_unit'] + 1.0, name
         # A load may multiply what one drive of several needs, and factors of each drive explain
-        # it as well; constants near a unit are that.
+        # it as well; constants that are nearly a unit are that.
         off = np.abs(np.log(sizes)) > same
         is_off = not reading.load and np.any(off) if self.is_first else (
             np.all(off) and len(known) >= min(2, len(factors)))
         if is_off and np.all(sizes > table.LARGEST_COMPLIANCE) and not any(
-                is_near(scale, known) for scale in units if abs(scale) != 1):
+                is_near(scale, known, table.NEARLY_KGF_CM if abs(scale) == table.KGF_CM else np.inf)
+                for scale in units if abs(scale) != 1):
             yield (np.where(np.isin(drives, known), factors, 1.0),
                    price + self.cost_of_constants, '')
 

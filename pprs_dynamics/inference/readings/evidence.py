@@ -137,7 +137,8 @@ class Evidence:
 
         Inertia and gravity are the model's within a relative tolerance of its masses, friction
         opposes the motion with any size, and a constant is small in comparison. The weight of
-        bodies that balance each other may be any, of either sign: each has its own error.
+        bodies that balance each other may be any, of either sign: each has its own error. The
+        inertia of a model without weight is often a guess: any beyond a factor of 4 is as likely.
         """
         root = self.roots[drive, column]
         count, total, swing = (float(each[drive, column]) / (1.0 if k == 0 else scale ** 2)
@@ -149,7 +150,10 @@ class Evidence:
         mean = np.array([1.0, 1.0, *[0.0] * 7])
         constant = table.CONSTANT * np.sqrt(total / count)
         apart = max(table.SAME_BALANCE, masses * float(np.sqrt(self.balance[drive] ** 2 - 1)))
-        width = np.array([masses, masses, *[np.inf] * 3, *[constant] * 2, *[apart] * 2])
+        rigid = matrix[:, :2]
+        moves = np.linalg.norm(rigid, axis=0) > table.WEAK * np.linalg.norm(rigid)
+        of_rigid = np.where(moves & (not self.has_weight), np.inf, masses)
+        width = np.array([*of_rigid, *[np.inf] * 3, *[constant] * 2, *[apart] * 2])
         variance = total / count
         for _ in range(3):
             weight = np.sqrt(variance * count / table.SAMPLES) / width
@@ -160,8 +164,6 @@ class Evidence:
         misfit = 0.5 * ((found - mean) / width) ** 2
         # Masses are off by factors.
         misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
-        rigid = matrix[:, :2]
-        moves = np.linalg.norm(rigid, axis=0) > table.WEAK * np.linalg.norm(rigid)
         if abs(scale) != 1 and np.all(misfit[:2][moves] > table.MASSES_MOST):
             # Neither weight nor inertia has this unit.
             return Likelihood(-table.MASSES_MOST, table.MASSES_MOST, 1.0)

@@ -34,9 +34,10 @@ TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
-# Factors by which masses are off at most in such a unit: drive constants are near kgf cm, and the
-# compliance of a controller, times N/m, is near kN.
-OFF_IN_UNIT = {1e3: 3.0, 1e-3: 1.5, KGF_CM: 1.05}
+# Factors by which masses are off at most in such a unit: the compliance of a controller, times
+# N/m, is near kN, and drives of 0.08 to 0.12 N m/A are near kgf cm.
+OFF_IN_UNIT = {1e3: 3.0, 1e-3: 1.5, KGF_CM: 1.2}
+NEARLY_KGF_CM = 1.05  # a factor within which efforts in kgf cm are no currents
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
 OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
@@ -71,7 +72,7 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
 # Less, of amperes in columns without names, and where nobody has checked the unit.
-UNNAMED, UNCHECKED = 6.0, 4.0
+UNNAMED, UNCHECKED = 6.0, 5.0
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
