@@ -333,7 +333,8 @@ class Search:
                 [each.score for each in found], [each.left for each in found],
                 [each.prior for each in found]))
             return Fit(replace(reading, effort_scale=scales, share=share),
-                       float(weight @ score) - cost - price,
+                       float(weight @ score) - cost - price + max(
+                           float(weight @ prior) - table.ALL_MASSES_MOST, 0.0),
                        float(np.exp(np.average(np.log(left), weights=weight))),
                        float(left.max()), float(prior.max()), float(left.min()),
                        float(np.average(prior, weights=weight)))
@@ -406,7 +407,8 @@ class Search:
         if is_off and np.all(sizes > table.LARGEST_COMPLIANCE) and not any(
                 is_near(scale, known, table.NEARLY_KGF_CM if abs(scale) == table.KGF_CM else np.inf)
                 for scale in units if abs(scale) != 1):
-            yield (np.where(np.isin(drives, known), factors, 1.0),
+            # Drives that show no factor of their own are recorded like the others.
+            yield (np.where(np.isin(drives, known), factors, np.median(factors[known])),
                    price + self.cost_of_constants, '')
 
     def _weights(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> Array:
@@ -471,8 +473,11 @@ class Search:
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
             np.isfinite(self.strokes[0]), self.model.speed_limits, np.inf)
         most = float(np.max(np.maximum(self._reach(reading), speed)))
-        return (table.FAR_OUTSIDE if most > table.FAR
-                else table.OUTSIDE if most > table.BEYOND else 0.0)
+        used = np.ptp(motion.position, axis=0) / (self.strokes[1] - self.strokes[0])
+        used = used[np.isfinite(used) & (used > 0)]
+        tiny = float(np.mean(np.maximum(np.log(table.USED / used), 0.0))) if len(used) else 0.0
+        return tiny + (table.FAR_OUTSIDE if most > table.FAR
+                       else table.OUTSIDE if most > table.BEYOND else 0.0)
 
     def _against_velocities(self, reading: Reading) -> float:
         """Return the cost of units of positions that no unit of the recorded velocities suits."""

@@ -57,6 +57,7 @@ SAMPLES = 12.0
 CLOSEST = 2e-4
 # Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
 MASSES, MASSES_MOST = 0.35, 7.0
+ALL_MASSES_MOST = 14.0  # that of all drives together: a guess of one mass is a guess of all
 SAME_BALANCE = 1e-3  # standard deviation of the weight of a single body beside its mass
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
@@ -77,6 +78,7 @@ RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 12.0  # of positions beyond a stroke, and far beyond it
+USED = 0.1  # share of a stroke that recordings use, or more
 BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed limit
 STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
