@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ import pytest
 from benchmarks.real import davinci as closed_chain
 from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics import DriveModel
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.inference.fit.mechanism_fit import fit_mechanism
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import EffectCandidate
@@ -47,6 +49,11 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     (folder / 'psm.yaml').write_text(closed_chain.model_text())
     model = DriveModel.load(folder / 'psm.yaml')
     return fit_mechanism(model, [part_of(model, closed_chain.FREE)])[0]
+
+
+@pytest.mark.parametrize('name', [closed_chain.FREE, 'load_parallel_105_fast.csv.gz'])
+def test_masses_that_are_guesses_are_no_other_unit(name: str, tmp_path: Path) -> None:
+    assert not first_model(DATA / 'psm.urdf', [DATA / name], tmp_path / 'a.yaml').questions
 
 
 def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: DriveModel) -> None:

@@ -161,17 +161,12 @@ def test_without_names_what_was_asked_for_is_not_what_was_measured(tmp_path: Pat
 
 
 def test_a_log_may_have_columns_of_words(tmp_path: Path) -> None:
-    time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
-    effort = arm_efforts(q, v, a) + np.random.default_rng(4).normal(0, 0.03, q.shape)
+    time, q, _, effort = run_of_arm()
     heads = ['%time', 'field.name0', 'field.name1', *(
         f'field.{quantity}{k}' for quantity in ('position', 'effort') for k in range(2))]
-    rows = [f'{1.7e18 + 1e9 * t:.0f},shoulder,elbow,' + ','.join(f'{x:.9g}' for x in (*p, *e))
-            for t, p, e in zip(time, q, effort, strict=True)]
-    path = tmp_path / 'run.csv'
-    path.write_text('\n'.join([','.join(heads), *rows]))
-    (tmp_path / 'robot.urdf').write_text(ARM)
-    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
-    found = read_recording(path, first.model.recorded)
+    stamps = np.array([f'{1.7e18 + 1e9 * t:.0f}' for t in time])
+    found = read_table(tmp_path, ','.join(heads), stamps, np.full(len(time), 'shoulder'),
+                       np.full(len(time), 'elbow'), q, effort)
     np.testing.assert_allclose(found.position, q, atol=1e-6)
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
 
@@ -198,14 +193,15 @@ def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = '
     return read_recording(folder / 'run.csv', first.model.recorded)
 
 
-def asked_about(folder: Path, head: str, *columns: np.ndarray, separator: str = ',') -> FirstModel:
+def asked_about(folder: Path, head: str, *columns: np.ndarray, separator: str = ',',
+                urdf: str = ARM) -> FirstModel:
     """Write a table, and return the first model for it."""
     cells = [column for each in columns for column in (
         each.T if each.ndim == 2 else [each])]
     lines = [separator.join(cell if isinstance(cell, str) else f'{cell:.10g}' for cell in row)
              for row in zip(*cells, strict=True)]
     (folder / 'run.csv').write_text('\n'.join([head] * bool(head) + lines))
-    (folder / 'robot.urdf').write_text(ARM)
+    (folder / 'robot.urdf').write_text(urdf)
     return first_model(folder / 'robot.urdf', [folder / 'run.csv'], folder / 'robot.yaml')
 
 
@@ -268,31 +264,21 @@ def test_one_effort_of_two_joints_is_a_question(head: str, columns: str, tmp_pat
     assert 'position: 2, ' in ''.join(lines) or '{position: q' in ''.join(lines)
 
 
-@pytest.mark.parametrize(('head', 'unit'), [
-    ('t,q1,q2,tau1 [%],tau2 [%]', (0.6, 0.3)),
-    ('t,q1 [deg],q2 [deg],tau1_permille,tau2_permille', (0.1, 0.1)), ('', (0.6, 0.3)),
-    ('', (2.5, 0.9)), ('', (0.6, 0.6))])
-def test_efforts_in_shares_of_an_unknown_one_are_a_question(
-    head: str, unit: tuple[float, float], tmp_path: Path,
-) -> None:
-    time, q, _, effort = run_of_arm()
-    angle = q if head.startswith('t,q1,') else np.rad2deg(q)
-    first = asked_about(tmp_path, head, time, angle, effort / unit)
-    assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain'))
-    # Of an unknown force no unit of positions follows.
-    assert not head or 'position_scale' not in ''.join(first.questions)
-
-
-@pytest.mark.parametrize(('head', 'turn', 'unit'), [
+@pytest.mark.parametrize(('head', 'angle', 'unit'), [
+    ('t,q1,q2,tau1 [%],tau2 [%]', 1.0, (0.6, 0.3)),
+    ('t,q1 [deg],q2 [deg],tau1_permille,tau2_permille', np.pi / 180, (0.1, 0.1)),
+    *(('', np.pi / 180, unit) for unit in ((0.6, 0.3), (2.5, 0.9), (0.6, 0.6))),
+    # 6.88 A per N m are nearly what turns in place of radians do to the efforts.
     ('', 2 * np.pi, (6.88, 6.88)), ('t,q1,q2,tau1,tau2', 2 * np.pi, (9.0, 9.0)),
     ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.3)), ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.6))])
-def test_amperes_and_percent_that_nearly_fit_are_a_question(
-    head: str, turn: float, unit: tuple[float, float], tmp_path: Path,
+def test_amperes_and_shares_of_an_unknown_effort_are_a_question(
+    head: str, angle: float, unit: tuple[float, float], tmp_path: Path,
 ) -> None:
-    """6.88 A per N m are nearly what turns in place of radians do to the efforts."""
     time, q, _, effort = run_of_arm()
-    first = asked_about(tmp_path, head, time, q / turn, effort / unit)
-    assert 'effort_scale' in ''.join(first.questions)
+    first = asked_about(tmp_path, head, time, q / angle, effort / unit)
+    assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain'))
+    # Of an unknown force no unit of positions follows.
+    assert not set('%_') & {*head} or 'position_scale' not in ''.join(first.questions)
 
 
 def test_a_torque_that_holds_no_model_is_a_question_and_no_other_unit(tmp_path: Path) -> None:
@@ -329,14 +315,10 @@ def test_units_of_a_slide_without_weight_are_right_or_a_question(
     random = np.random.default_rng(3)
     time, q, v, a = motion(random, 1, 0.15)
     force = 8 * a + 15 * v + 6 * np.tanh(v / width) + random.normal(0, 0.03, q.shape)
-    path = tmp_path / 'run.csv'
-    np.savetxt(path, np.column_stack([time, position * q, effort * force]), delimiter=',',
-               comments='', header='time,q,tau', fmt='%.8g')
-    lying = SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"')
-    (tmp_path / 'robot.urdf').write_text(lying.replace(
-        'lower="-0.5" upper="0.5"', f'lower="{-stroke}" upper="{stroke}"'))
-    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
-    found = read_recording(path, first.model.recorded)
+    lying = SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"').replace(
+        'lower="-0.5" upper="0.5"', f'lower="{-stroke}" upper="{stroke}"')
+    first = asked_about(tmp_path, 'time,q,tau', time, position * q, effort * force, urdf=lying)
+    found = read_recording(tmp_path / 'run.csv', first.model.recorded)
     is_right = np.allclose(found.position, q, atol=1e-6) and np.allclose(
         found.effort, force, atol=1e-3)
     assert is_right or ' or ' in ''.join(first.questions)

@@ -14,7 +14,7 @@ import pytest
 from made_up_files import ARM, SLIDE, arm_efforts, motion
 
 from pprs_dynamics.app.api.diagnose import diagnose
-from pprs_dynamics.app.api.first_model import first_model
+from pprs_dynamics.app.api.first_model import FirstModel, first_model
 from pprs_dynamics.app.api.fit import fit
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -98,18 +98,23 @@ def test_limits_of_a_motor_that_turns_freely_say_nothing(constant: bool, tmp_pat
     assert told(model, time, q, effort[:, None]) == ''
 
 
+def first_of(folder: Path, urdf: str, *columns: np.ndarray) -> FirstModel:
+    """Return the first model of a robot with one joint and a run of times, positions, efforts."""
+    (folder / 'robot.urdf').write_text(urdf)
+    np.savetxt(folder / 'run.csv', np.column_stack(columns), delimiter=',', comments='',
+               header='time,pos,force')
+    return first_model(folder / 'robot.urdf', [folder / 'run.csv'], folder / 'robot.yaml')
+
+
 @pytest.mark.parametrize('true', [1.0, 10.0])
 def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
     true: float, tmp_path: Path,
 ) -> None:
     """A tenth of the inertia in the URDF has the same data as efforts in kgf cm."""
-    (tmp_path / 'motor.urdf').write_text(MOTOR.replace('"-6.3"', '"-2.5"').replace('"6.3"', '"2.5"'))
     time, q, v, a = motion(np.random.default_rng(5), 1, 1.2)
     effort = true * (0.003 * a + 0.01 * v + 0.02 * np.tanh(v / 0.05))
     effort += np.random.default_rng(1).normal(0, 1e-3, q.shape)
-    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, q, effort]), delimiter=',',
-               comments='', header='time,pos,torque')
-    first = first_model(tmp_path / 'motor.urdf', [tmp_path / 'run.csv'], tmp_path / 'a.yaml')
+    first = first_of(tmp_path, MOTOR.replace('6.3', '2.5'), time, q, effort)
     assert not first.columns.get('motor', {}).get('effort_scale')
     assert ('all is as the model file says' in ''.join(first.questions)) == (true != 1)
 
@@ -155,10 +160,8 @@ def test_efforts_far_from_the_inertia_of_a_lying_slide_are_a_question(
     time, q, v, a = motion(np.random.default_rng(3), 1, 0.15)
     force = 8 * a + 15 * v + 6 * np.tanh(v / 0.005) + np.random.default_rng(4).normal(
         0, 0.03, q.shape)
-    (tmp_path / 'slide.urdf').write_text(SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"'))
-    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, q, force / constant]), delimiter=',',
-               comments='', header='time,pos,force')
-    first = first_model(tmp_path / 'slide.urdf', [tmp_path / 'run.csv'], tmp_path / 'a.yaml')
+    lying = SLIDE.replace('axis xyz="0 0 1"', 'axis xyz="1 0 0"')
+    first = first_of(tmp_path, lying, time, q, force / constant)
     assert 'effort_scale' in ''.join(first.questions)
 
 

@@ -39,7 +39,7 @@ from pprs_dynamics.inference.readings.findings import (
     near,
     velocity_factors,
 )
-from pprs_dynamics.inference.readings.mounting import MOUNTING, other_mounting
+from pprs_dynamics.inference.readings.mounting import MOUNTING, mounting_in
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -126,11 +126,6 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
                 ' and '.join(mistake.what for mistake in each) or PLAIN for each in each_of),
             ' or '.join(line for each in each_of for line in lines_of(each, has_columns)))]
     kinds = {mistake.kind for mistake in mistakes}
-    if mistakes and (other := other_mounting(model, [recording], is_oblique=True)):
-        # Of readings only gravity along axes is one: others come near to an oblique one.
-        looks = other[model.drives[0]]
-        return (OtherReading.of(MOUNTING, model.drives, range(len(model.drives)), looks.what,
-                                looks.line),)
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
             likely[0].reading.time_unit if likely else 1.0))
@@ -241,7 +236,7 @@ class Search:
         seed = None
         while self._top() is not seed:
             seed = self._top()
-            self.fits += [fit for row in self.rows[1:]
+            self.fits += [fit for row in (*self.rows[1:], *self._mounting(seed.reading))
                           if row.kind in tried and self._may_follow(row, seed.reading)
                           for fit in self.fits_of(row.after(seed.reading))
                           if self._is_credible(row, fit)]
@@ -266,6 +261,13 @@ class Search:
             return []
         rivals = self._rivals(best)
         return [best, *rivals] if not best.reading.is_plain or (self.is_first and rivals) else []
+
+    def _mounting(self, before: Reading) -> list[Reading]:
+        """Return the row with the gravity that explains what another reading does not."""
+        excerpt = self.excerpts.get(before.time_unit)
+        row = None if excerpt is None or MOUNTING in before.kinds or not self.has_gain else (
+            mounting_in(self.model, excerpt, before))
+        return [] if row is None else [row]
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""

@@ -90,7 +90,7 @@ class Evidence:
             0, count, PIECE)] * in_pieces
         for part in rows:
             try:
-                forces[:, part] = _forces(model, _taken(moved, part), excerpt.time[part])
+                forces[:, part] = forces_of(model, _taken(moved, part), excerpt.time[part])
             except (PprsError, np.linalg.LinAlgError):
                 if not in_pieces:
                     return None
@@ -223,17 +223,16 @@ def _is_steady(root: Array, force: Array) -> bool:
     return size - mean ** 2 * float(ones @ ones) < table.STEADY ** 2 * size
 
 
-def gravity_in(model: DriveModel, direction: Array) -> tuple[str, tuple[float, ...]]:
-    """Return the key of a model's gravity, and gravity in another direction [m/s^2]."""
-    key = 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
-    return key, tuple((np.linalg.norm(model.values[key]) * direction + 0.0).tolist())
+def gravity_key(model: DriveModel) -> str:
+    """Return the key of a model's gravity."""
+    return 'robot.gravity' if 'robot.gravity' in model.values else 'gravity'
 
 
 def in_reading(model: DriveModel, reading: Reading) -> DriveModel:
     """Return a model under the gravity, and with the load, of a reading."""
     changes: dict[str, Any] = {}
     if reading.gravity is not None:
-        changes = dict([gravity_in(model, reading.gravity)])
+        changes = {gravity_key(model): tuple((reading.gravity + 0.0).tolist())}
     if reading.load:
         changes |= {'effects.active': (*model.values.get('effects.active', ()), PayloadMass.name),
                     f'effects.{PayloadMass.name}.mass': reading.load}
@@ -257,7 +256,7 @@ def _taken(motion: DriveMotion, part: slice) -> DriveMotion:
                    segments=(slice(0, part.stop - part.start),))
 
 
-def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
+def forces_of(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     """Return forces by inertia, by gravity and by all else, (3, N, D)."""
     bodies = {RIGID_BODY, DriveInertia.name, *(
         effect.name for effect in model.effects if isinstance(effect, BodyEffect))}

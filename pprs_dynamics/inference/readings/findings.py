@@ -11,13 +11,14 @@ from typing import Any, Self
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveColumns, RecordedColumns
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
     Shares,
     effort_contents,
-    gravity_in,
+    gravity_key,
 )
 from pprs_dynamics.inference.readings.names import is_share
 from pprs_dynamics.inference.readings.table import Reading, named
@@ -111,6 +112,12 @@ def lines_of(findings: Iterable[Defect], has_columns: bool = False) -> list[str]
     return [*filter(None, (first, *(mistake.line for mistake in mistakes)))]
 
 
+def gravity_line(model: DriveModel, gravity: Array) -> str:
+    """Return the line of a model file with gravity in the base, (3,) [m/s^2]."""
+    line = f'gravity: [{", ".join(f"{value:g}" for value in gravity + 0.0)}]'
+    return f'robot: {{{line}}}' if gravity_key(model).startswith('robot') else line
+
+
 # -------------------------------------------------------------------------- of other readings
 
 
@@ -125,10 +132,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         if part.kind == 'drive_order':
             changes, line = _order_scales(model, recording, reading)
         if part.gravity is not None:
-            key, vector = gravity_in(model, part.gravity)
-            line = (f'gravity: [{", ".join(f"{value:g}" for value in vector)}] '
-                    + ('under robot' if key.startswith('robot') else 'in the model file'))
-            changes = ()
+            line, changes = gravity_line(model, part.gravity), ()
         if part.what:
             found.append(OtherReading.of(part.kind, drives, part.drives, part.what, line,
                                          scales=changes))

@@ -12,83 +12,93 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.readings.findings import NoMeasurement
-from pprs_dynamics.inference.readings.table import MOUNTINGS
-from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.readings import table
+from pprs_dynamics.inference.readings.evidence import (
+    forces_of,
+    gravity_key,
+    in_reading,
+    read_motion,
+)
+from pprs_dynamics.inference.readings.findings import NoMeasurement, gravity_line
+from pprs_dynamics.inference.readings.table import Reading
+from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOUNTING = 'mounting'  # kind of the finding
-OBLIQUE = 0.1  # [rad] from an axis; nearer ones may be a zero that is a quarter turn off
+ALONG = 0.1  # [rad] from an axis of the base, up to which gravity is along it
 SAME_SIZE = 0.05  # relative error of gravity's size, up to which a vector is gravity
 LEAST_TILT = BaseTilt.linear[0].upper  # [rad]; a smaller one is the effect base_tilt
-MOST_LEFT = 0.25  # of the variance of each drive's error, with another direction
+MOST_LEFT = 0.25  # of the squared error of each drive with the model's direction
 
 
-def other_mounting(model: DriveModel, recordings: Sequence[Recording], is_oblique: bool = False,
-                   ) -> dict[str, NoMeasurement]:
-    """Return the finding that gravity has another direction than in the model, by drive.
+def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
+    """Return the finding that gravity has another direction than in the model, by drive."""
+    plain = table.readings(model.drives, model.units)[0]
+    for recording in recordings:
+        excerpt = excerpt_of(recording, table.STRETCHES)
+        row = None if excerpt is None else mounting_in(model, excerpt, plain, SAME_SIZE)
+        if row is not None and row.gravity is not None:
+            finding = NoMeasurement.of(MOUNTING, model.drives, row.drives, row.what,
+                                       gravity_line(model, row.gravity))
+            return dict.fromkeys(model.drives, finding)
+    return {}
 
-    `is_oblique`: only where it is along no axis of the base, nor against the model's.
+
+def mounting_in(model: DriveModel, excerpt: Excerpt, reading: Reading, same_size: float = np.inf,
+                ) -> Reading | None:
+    """Return the row of the table with the gravity that explains the efforts of a reading.
+
+    Efforts, in any unit, are fitted with a free gravity vector, and each drive's inertia, friction
+    and offset. None where the direction is the model's, explains the efforts of some drive not
+    much better, or the size is off by more than a relative error.
     """
-    given = np.asarray(model.robot.gravity, dtype=float) if model.moves_joints else np.zeros(3)
-    gravity = _other_gravity(model, recordings, given)
-    if gravity is None or (is_oblique and any(
-            _angle(gravity, np.array(axis, float)) < OBLIQUE for axis in (*MOUNTINGS, -given))):
-        return {}
-    found, said = (', '.join(f'{round(value, 1) + 0.0:.1f}' for value in vector)
-                   for vector in (gravity, given))
-    finding = NoMeasurement.of(
-        MOUNTING, model.drives, range(len(model.drives)),
-        f'gravity in the base is ({found}) m/s² in this recording and ({said}) m/s² in the model: '
-        'the robot is mounted in another direction', f'robot: {{gravity: [{found}]}}')
-    return dict.fromkeys(model.drives, finding)
-
-
-def _other_gravity(model: DriveModel, recordings: Sequence[Recording], given: Array,
-                   ) -> Array | None:
-    """Return gravity in the base, (3,) [m/s^2], where it has another direction than `given`.
-
-    Efforts are fitted with a free gravity vector, and each drive's inertia, friction and offset.
-    """
+    given = np.asarray(model.values[gravity_key(model)], dtype=float)
     size = float(np.linalg.norm(given))
     if size == 0:
         return None
+    motion = read_motion(excerpt.motion, reading)
     try:
-        residuals = measure_residuals(model, recordings)[0]
-    except PprsError:  # of what cannot be compared nothing is known
+        (_, nothing, _), *weights = (forces_of(in_reading(model, replace(
+            reading, gravity=gravity)), motion, excerpt.time)
+            for gravity in (np.zeros(3), *size * np.eye(3)))
+    except (PprsError, np.linalg.LinAlgError):  # what the mechanism cannot follow
         return None
-    q, v, a = (residuals.variables[name] for name in ('position', 'velocity', 'acceleration'))
-
-    def weight(gravity: Array) -> Array:
-        """Return the efforts at rest, (M, D)."""
-        robot = replace(model.robot, gravity=tuple(gravity.tolist()))
-        efforts: Array = replace(model, robot=robot, effects=()).drive_forces(
-            JointMotion(q, 0.0 * q, 0.0 * q, residuals.time)).total
-        return efforts
-
-    nothing = weight(np.zeros(3))
-    columns = np.stack([weight(axis) - nothing for axis in size * np.eye(3)], axis=2)
-    own = np.stack((v, np.sign(v), a, np.ones_like(v)), axis=2)
+    columns = np.stack([weight - nothing for _, weight, _ in weights], axis=2)
+    v, a, inertia = motion.velocity, motion.acceleration, weights[0][0]
+    own = np.stack((v, np.sign(v), a, np.ones_like(v), inertia), axis=2)
     rows, targets = [], []
-    for d in np.flatnonzero(np.isfinite(residuals.error).any(axis=0)):
-        at = np.isfinite(residuals.error[:, d])
-        y = np.column_stack((residuals.error[at, d], columns[at, d]))
+    for d, effort in enumerate(excerpt.effort[:, reading.efforts].T):
+        at = np.isfinite(effort)
+        y = np.column_stack((effort[at], columns[at, d]))
         # What the drive's inertia, friction and offset do not explain.
         rest = y - own[at, d] @ np.linalg.lstsq(own[at, d], y, rcond=None)[0]
         rest /= max(root_mean_square(rest[:, 0]), 1e-300)
-        rows.append(rest[:, 1:])
-        targets.append(rest[:, 0] + rest[:, 1:] @ (given / size))
-    share = np.linalg.lstsq(np.concatenate(rows), np.concatenate(targets), rcond=1e-3)[0]
-    is_explained = all(np.mean((target - G @ share) ** 2) < MOST_LEFT
-                       for G, target in zip(rows, targets, strict=True) if np.any(G))
-    norm = float(np.linalg.norm(share))
-    if abs(norm - 1) > SAME_SIZE or _angle(share, given) < LEAST_TILT or not is_explained:
+        if np.any(rest[:, 1:]):
+            rows.append(rest[:, 1:])
+            targets.append(rest[:, 0])
+    if not rows:
         return None
-    gravity: Array = size * share.round(3)
-    return gravity
+    G, target = np.concatenate(rows), np.concatenate(targets)
+    share = np.linalg.lstsq(G, target, rcond=1e-3)[0]
+    along = G @ given
+    same = given * max(float(along @ target), 0.0) / max(float(along @ along), 1e-300)
+    is_explained = all(
+        np.sum((target - G @ share) ** 2) < MOST_LEFT * np.sum((target - G @ same) ** 2)
+        for G, target in zip(rows, targets, strict=True))
+    norm = float(np.linalg.norm(share))
+    if not is_explained or abs(norm - 1) > same_size or _angle(share, given) < LEAST_TILT:
+        return None
+    axis = np.eye(3)[np.argmax(np.abs(share))] * np.sign(share[np.argmax(np.abs(share))])
+    gravity = size * axis if _angle(share, axis) < ALONG else (size / norm * share).round(1)
+    found, known = (', '.join(f'{value + 0.0:g}' for value in vector)
+                    for vector in (gravity, given))
+    return replace(
+        table.readings(model.drives, model.units)[0], kind=MOUNTING, gravity=gravity,
+        drives=tuple(range(len(model.drives))), cost=table.COST[MOUNTING],
+        what=f'gravity in the base is ({found}) m/s² in this recording and ({known}) m/s² in the '
+        'model: the robot is mounted in another direction')
 
 
 def _angle(a: Array, b: Array) -> float:

@@ -46,8 +46,6 @@ CALMER = 0.5  # changes from sample to sample, over those of the numbers without
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
-# Directions of gravity in the base of a robot on a wall or under a ceiling.
-MOUNTINGS = {(0, 0, 1): '+z', (1, 0, 0): '+x', (-1, 0, 0): '-x', (0, 1, 0): '+y', (0, -1, 0): '-y'}
 
 # ------------------------------------------------------------------------ likelihood and priors
 
@@ -230,7 +228,7 @@ class Reading:
     time_unit : float
         [s].
     gravity : (3,) array, optional
-        Direction of gravity in the base, if it is not the model's.
+        Gravity in the base, if it is not the model's [m/s^2].
     load : float
         At the tool, beyond the model's [kg].
     parts : tuple of Reading
@@ -331,9 +329,6 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     for group in _groups(drives, every):
         add('position_sign', f'the {_position(drives, group)} negated', group, ALL_NEGATED * (
             len(group) == len(every) > 1), scale=np.where(np.isin(same, group), -1.0, 1.0))
-    for direction, name in MOUNTINGS.items():
-        add('mounting', f'the base looks mounted so that gravity points along its {name}', every,
-            gravity=np.array(direction, float))
     turned = [{k: turn} for k in every if units[k].turns for turn in QUARTERS]
     if len(turned) <= MOST_TURNED * len(QUARTERS):  # two may be off together
         turned += [first | second for first, second in combinations(turned, 2)
