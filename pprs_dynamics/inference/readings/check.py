@@ -60,11 +60,11 @@ class Fit:
     reading : Reading
     score : float
         [nats].
-    left, most_left : float
+    residual, largest_residual : float
         Mean residual and the largest of a drive, over the squared effort.
     prior, mean_prior : float
         Largest and weighted mean prior cost of a drive [nats].
-    least_left : float
+    least_residual : float
         Smallest residual of a drive.
     is_rigid : bool
         Whether each effort certainly has inertia or weight in it.
@@ -72,10 +72,10 @@ class Fit:
 
     reading: Reading
     score: float = 0.0
-    left: float = 1.0
-    most_left: float = 1.0
+    residual: float = 1.0
+    largest_residual: float = 1.0
     prior: float = 0.0
-    least_left: float = 1.0
+    least_residual: float = 1.0
     mean_prior: float = 0.0
     is_rigid: bool = False
 
@@ -86,7 +86,7 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
     Raises
     ------
     MisreadError
-        With `refuse`, where its units, signs or order look otherwise than it says.
+        With `refuse`, where its units, signs or order look different from what the model file says.
     """
     mistakes = find_mistakes(model, recording)
     others = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
@@ -111,20 +111,20 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if found := tuple(find_sign_bit(recording)):
         return found
     search = Search(model, recording, is_first)
-    if wrong := [each for each in find_other_velocities(model, search.excerpts.get(1.0))
-                 if each.kind == 'rate']:
+    if wrong := [velocity for velocity in find_other_velocities(model, search.excerpts.get(1.0))
+                 if velocity.kind == 'rate']:
         return tuple(wrong)
     likely = search.likely()
-    each_of = [findings_of(model, recording, fit.reading) for fit in likely]
-    mistakes: list[Defect] = [*each_of[0]] if likely else []
+    by_reading = [findings_of(model, recording, fit.reading) for fit in likely]
+    mistakes: list[Defect] = [*by_reading[0]] if likely else []
     if len(likely) > 1:
         has_columns = model.recorded.columns is not None
-        kinds = {mistake.kind for each in each_of for mistake in each}
+        kinds = {mistake.kind for mistakes in by_reading for mistake in mistakes}
         kind = 'drive_order' if kinds == {'drive_order'} else 'ambiguous'
         mistakes = [OtherReading.of(
             kind, model.drives, range(len(model.drives)), ', or '.join(
-                ' and '.join(mistake.what for mistake in each) or PLAIN for each in each_of),
-            ' or '.join(line for each in each_of for line in lines_of(each, has_columns)))]
+                ' and '.join(mistake.what for mistake in found) or PLAIN for found in by_reading),
+            ' or '.join(line for found in by_reading for line in lines_of(found, has_columns)))]
     kinds = {mistake.kind for mistake in mistakes}
     if not kinds & {'position_unit', 'position_sign'}:
         mistakes += find_other_velocities(model, search.excerpts.get(
@@ -172,7 +172,7 @@ class Search:
         self.is_first = is_first
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
-        self.has_gain = knows_forces(model)  # else masses and units say nothing
+        self.has_gain = knows_forces(model)  # without it masses and units are no evidence
         self.masses = table.MASSES if self.has_gain else np.inf
         # Recorded velocities over the derivatives of positions.
         self.factors = velocity_factors(self.excerpts[1.0]) if 1.0 in self.excerpts else {}
@@ -227,12 +227,12 @@ class Search:
         explains = is_inside and start.reading.is_plain and self.has_gain and (
             start.prior < self.plausible)
         # Hardly anything may be explained better.
-        if explains and start.most_left < (
+        if explains and start.largest_residual < (
                 table.CLOSEST_FIT if self.is_first else table.CLOSE_FIT):
             return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
         tried = {'position_unit', 'drive_order'} if explains and (
-            start.most_left < table.EXPLAINED) else {*table.COST}
+            start.largest_residual < table.EXPLAINED) else {*table.COST}
         seed = None
         while self._top() is not seed:
             seed = self._top()
@@ -245,9 +245,9 @@ class Search:
     def likely(self) -> list[Fit]:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
         best = self.best()
-        if best.reading.is_plain or best.left > table.GOOD_FIT:
+        if best.reading.is_plain or best.residual > table.GOOD_FIT:
             far = self._reach(self.start.reading) > table.FAR
-            if best.left <= table.GOOD_FIT:
+            if best.residual <= table.GOOD_FIT:
                 # Angles that explain the efforts are in the right unit, whatever limits say.
                 far &= [not units.turns for units in self.model.units]
             rows = [row for row in self.rows if np.any(far) and row.kind == 'position_unit'
@@ -256,7 +256,7 @@ class Search:
                 return [Fit(rows[0].after(self.rows[0])), self.start]
         # The inertia of a drive without weight may be invented, a unit of its efforts not.
         evidence, scales = self.evidence(best.reading), best.reading.effort_scale
-        if best.left > table.GOOD_FIT or evidence is None or not self._is_certain(best) or not (
+        if best.residual > table.GOOD_FIT or evidence is None or not self._is_certain(best) or not (
                 self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))):
             return []
         rivals = self._rivals(best)
@@ -278,7 +278,7 @@ class Search:
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
         # Symmetric robots fit nearly as well in another order of their drives.
-        return row.kind != 'drive_order' or fit.left < table.BETTER_ORDER * self.start.left
+        return row.kind != 'drive_order' or fit.residual < table.BETTER_ORDER * self.start.residual
 
     def _top(self) -> Fit:
         """Return the best reading; of those that fit alike the first, which is the simplest."""
@@ -331,14 +331,12 @@ class Search:
 
         def fit_of(scales: Array, price: float, share: str = '') -> Fit:
             found = [likelihood(d, float(scales[d])) for d in measured]
-            score, left, prior = (np.array(each) for each in (
-                [each.score for each in found], [each.left for each in found],
-                [each.prior for each in found]))
+            score, prior, residual = np.array(found).T
             return Fit(replace(reading, effort_scale=scales, share=share),
                        float(weight @ score) - cost - price + max(
                            float(weight @ prior) - table.ALL_MASSES_MOST, 0.0),
-                       float(np.exp(np.average(np.log(left), weights=weight))),
-                       float(left.max()), float(prior.max()), float(left.min()),
+                       float(np.exp(np.average(np.log(residual), weights=weight))),
+                       float(residual.max()), float(prior.max()), float(residual.min()),
                        float(np.average(prior, weights=weight)))
 
         def alone(d: int, scales: Sequence[float]) -> float:

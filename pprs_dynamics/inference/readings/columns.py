@@ -73,7 +73,7 @@ class AmbiguousColumns(GuessError):
 
 @dataclass(frozen=True)
 class Guess:
-    """Which columns are what.
+    """Columns by joint and quantity, and how they are read.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Guess:
 def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
                   others: Collection[str] = (), rate: float | None = None,
                   model: DriveModel | None = None) -> Guess:
-    """Return which columns are what.
+    """Return the columns of times, positions, velocities and efforts.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
             or not _counts_rows(item.values)]
     if not left:
         raise GuessError('no column has numbers other than times, must be positions of the '
-                         'joints beside times')
+                         'joints in addition to times')
     if len(left) == 1 < len(joints) and not left[0].title:
         raise GuessError(
             f'each line has one number, must have one for each of {len(joints)} joints: '
@@ -146,12 +146,12 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     if titled:
         columns, found = _by_names(titled, joints, quantity, others)
     elif quantity:
-        columns, found = {(joint, quantity): each.column
-                          for joint, each in zip(joints, left, strict=False)}, []
+        columns, found = {(joint, quantity): item.column
+                          for joint, item in zip(joints, left, strict=False)}, []
     elif model is None:
         raise GuessError('columns without names need a model of the robot')
     else:
-        count = max((len(each.values) for each in left), default=0)
+        count = max((len(item.values) for item in left), default=0)
         stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
         columns, found = _by_numbers(left, joints, stamps, time is not None, rate is not None,
                                      stamp, notes, model), []
@@ -160,12 +160,12 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     known = [joint for joint in joints if (joint, main) in columns]
     if known and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
         _ask_for_one(joints, stamp | columns, [
-            each.column for each in titled if each.column not in columns.values()
-            and fit_of_name(tuple(words_of(each.title)), {'': each.column}, EFFORT, None)[0] > 0])
+            item.column for item in titled if item.column not in columns.values()
+            and fit_of_name(tuple(words_of(item.title)), {'': item.column}, EFFORT, None)[0] > 0])
     if not known:
         raise GuessError(
-            f'no columns of {main}s are told by their names: ' + ', '.join(
-                each.title or str(each.column) for each in left[:12])
+            f'no names of columns say that they are {main}s: ' + ', '.join(
+                item.title or str(item.column) for item in left[:12])
             + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {left[0].column}}}}}')
     by_column = {item.column: item for item in series}
     scales = {key: scale for key, column in columns.items()
@@ -193,21 +193,21 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
 def _time(series: Sequence[Series], has_rate: bool,
           ) -> tuple[Series | None, Column | None, float | None, list[str]]:
     """Return the times, a column of their fractions, their unit if not [s], and comments."""
-    rising = [each for each in series if _rises(each.values)]
-    ours = [each for each in rising if each.title in TIME_COLUMNS]
+    rising = [item for item in series if _rises(item.values)]
+    ours = [item for item in rising if item.title in TIME_COLUMNS]
     for whole, part in () if ours else pairwise(series):
         if _counts_parts(whole.values, part.values):
             return replace(whole, values=whole.values + fraction_of_seconds(part.values)), (
                 part.column), None, [f'column {part.column} has the fractions of the seconds in '
                                      f'column {whole.column}']
-    named = ours or [each for each in rising if _is_time(words_of(each.title))]
+    named = ours or [item for item in rising if _is_time(words_of(item.title))]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
         # Positions may rise as well: with a rate no column is needed.
         even = [] if has_rate else [
-            each for each in rising if _is_even(each.values)
-            and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
+            item for item in rising if _is_even(item.values)
+            and (not item.title or (item is series[0] and not _counts_rows(item.values)))]
         if not even:
             return None, None, None, notes
         # A counter of rows may come first.
@@ -280,33 +280,33 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         for item in series:
             groups.setdefault(tuple(words_of(item.title)), {}).setdefault(joints[0], item.column)
     columns: Columns = {}
-    values = np.column_stack([each.values for each in series])
-    places = {each.column: k for k, each in enumerate(series)}
+    values = np.column_stack([item.values for item in series])
+    places = {item.column: k for k, item in enumerate(series)}
     currents_are_measured = False
     wanted = (quantity,) if quantity else (POSITION, VELOCITY, CURRENT, EFFORT)
-    for each in wanted:
-        fits = {key: fit_of_name(key, members, each, quantity) for key, members in groups.items()}
+    for kind in wanted:
+        fits = {key: fit_of_name(key, members, kind, quantity) for key, members in groups.items()}
         best = max(fits, key=lambda key: fits[key], default=())
         if not best or fits[best][0] <= 0:
             continue
         # Efforts come before currents, but what was measured before all else.
         is_measured = not {*best} & (table.COMMANDS | table.FROM_OUTSIDE)
-        if each == EFFORT and not is_measured and currents_are_measured:
+        if kind == EFFORT and not is_measured and currents_are_measured:
             continue
-        currents_are_measured = each == CURRENT and is_measured
+        currents_are_measured = kind == CURRENT and is_measured
         rivals = [key for key in groups if fits[key] == fits[best]]
         # Of groups that move alike commands come first in time.
         shared = [joint for joint in groups[best] if all(joint in groups[key] for key in rivals)]
         blocks = [[places[groups[key][joint]] for joint in shared] for key in rivals]
         best = rivals[measured(values, blocks)] if shared else best
-        if each == EFFORT:
+        if kind == EFFORT:
             columns = {key: column for key, column in columns.items() if key[1] != CURRENT}
-        columns.update({(joint, each): column for joint, column in groups[best].items()})
-    for channel, telling in table.CHANNEL_WORDS.items() if quantity is None else ():
-        told = [key for key in groups if {*key} & telling and not {*key} & table.COMMANDS]
-        if told:
+        columns.update({(joint, kind): column for joint, column in groups[best].items()})
+    for channel, of_channel in table.CHANNEL_WORDS.items() if quantity is None else ():
+        named = [key for key in groups if {*key} & of_channel and not {*key} & table.COMMANDS]
+        if named:
             columns.update({(joint, channel): column for joint, column in groups[max(
-                told, key=lambda key: len(groups[key]))].items()})
+                named, key=lambda key: len(groups[key]))].items()})
     return columns, notes
 
 
@@ -316,11 +316,11 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, has_times: bool,
                 has_rate: bool, stamp: Columns, notes: list[str], model: DriveModel) -> Columns:
     """Return columns without names: positions by derivatives, efforts by what explains them."""
-    count, values = len(joints), np.column_stack([each.values for each in series])
+    count, values = len(joints), np.column_stack([item.values for item in series])
     found = layouts(values, time, count)
     if not found:
         raise GuessError(
-            f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
+            f'there is no header, and {len(series)} columns without time are no blocks of {count} '
             f'joints ({", ".join(joints)}): write columns: {{time: 1, {joints[0]}: '
             '{position: 2, effort: …}} with numbers from 1')
 
@@ -339,34 +339,34 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
             has_rate and near(layout.rate, (1.0, *table.VELOCITY_UNITS)))
         for rate in [1.0] * (has_rate or not says_rate) + [layout.rate] * says_rate:
             fits.append((_fit(model, values, time / rate, layout), layout))
-    fits.sort(key=lambda each: -each[0].score)
+    fits.sort(key=lambda pair: -pair[0].score)
     best, layout = fits[0]
-    rivals = [each for fit, each in fits if (
-        fit.score > best.score - table.SURE or best.left > table.GOOD_FIT) and not all(
-            kind in each.blocks and kind in layout.blocks
-            and move_alike(values, layout.blocks[kind], each.blocks[kind])
-            for kind in (POSITION, EFFORT)) and each is not layout]
+    rivals = [other for fit, other in fits if (
+        fit.score > best.score - table.SURE or best.residual > table.GOOD_FIT) and not all(
+            kind in other.blocks and kind in layout.blocks
+            and move_alike(values, layout.blocks[kind], other.blocks[kind])
+            for kind in (POSITION, EFFORT)) and other is not layout]
     if rivals:
         raise AmbiguousColumns(joints, [read(layout.blocks), read(rivals[0].blocks)],
                                'two readings of the columns are as likely')
-    if EFFORT not in layout.blocks or (best.least_left < table.NO_EFFORT < best.most_left
+    if EFFORT not in layout.blocks or (best.least_residual < table.NO_EFFORT < best.largest_residual
                                        and not best.is_rigid):
         known = {kind: block for kind, block in layout.blocks.items() if kind != EFFORT}
         used = [place for block in known.values() for place in block]
         _ask_for_one(joints, read(known), [
-            each.column for place, each in enumerate(series) if place not in used])
+            item.column for place, item in enumerate(series) if place not in used])
     if len(series) == count and not count % 2:
         half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]
         raise AmbiguousColumns(
             joints, [read(layout.blocks), stamp | dict(zip(
-                half, (each.column for each in series), strict=True))],
+                half, (item.column for item in series), strict=True))],
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
     used = [place for block in layout.blocks.values() for place in block]
     unused = [place for place in range(len(series)) if place not in used]
-    told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
+    taken = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in layout.blocks.items()]
-    notes.append('no header: ' + ', '.join(told) + (
+    notes.append('no header: ' + ', '.join(taken) + (
         f'; {_span(series, unused)} not used' if unused else ''))
     return {key: column for key, column in read(layout.blocks).items() if key not in stamp}
 

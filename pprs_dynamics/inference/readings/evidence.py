@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY
 
-CONDITION = 1e-6  # of a column beside others: less is rounding
+CONDITION = 1e-6  # of a column among others: less is rounding
 # Columns of the regression of one drive; the effort is the last one.
 INERTIA, GRAVITY, OTHERS, VELOCITY, DIRECTION, CONSTANT, EFFORT = range(7)
 
@@ -42,7 +42,7 @@ class Likelihood(NamedTuple):
 
     score: float
     prior: float
-    left: float
+    residual: float
 
 
 @dataclass
@@ -141,8 +141,8 @@ class Evidence:
         inertia of a model without weight is often a guess: any beyond a factor of 4 is as likely.
         """
         root = self.roots[drive, column]
-        count, total, swing = (float(each[drive, column]) / (1.0 if k == 0 else scale ** 2)
-                               for k, each in enumerate((self.count, self.total, self.swing)))
+        count, total, swing = (float(sums[drive, column]) / (1.0 if k == 0 else scale ** 2)
+                               for k, sums in enumerate((self.count, self.total, self.swing)))
         matrix = np.column_stack([root[:, :EFFORT], -root[:, CONSTANT],
                                   root[:, GRAVITY], -root[:, GRAVITY]])
         target = root[:, EFFORT] / scale
@@ -170,7 +170,7 @@ class Evidence:
         cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves])
                      + np.sum(misfit[2:]))
         # Friction beyond some times the rigid body's forces is unlikely.
-        friction, weight_of = (np.linalg.norm(each) + 1e-300 for each in (
+        friction, weight_of = (np.linalg.norm(force) + 1e-300 for force in (
             matrix[:, OTHERS:CONSTANT] @ found[OTHERS:CONSTANT], rigid.sum(axis=1)))
         excess = float(np.log(friction / weight_of / table.FRICTION))
         cost += min(0.5 * max(excess, 0.0) ** 2, table.FRICTION_MOST)
@@ -263,8 +263,8 @@ def forces_of(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     still = np.zeros_like(motion.velocity)
     rigid, others = [], np.zeros_like(still)
     with np.errstate(all='ignore'):
-        for each in (motion, replace(motion, velocity=still, acceleration=still)):
-            followed = motion_of_drives(model, time, each).with_time(time)
+        for moved in (motion, replace(motion, velocity=still, acceleration=still)):
+            followed = motion_of_drives(model, time, moved).with_time(time)
             forces = model.drive_forces(followed)
             rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
                                 axis=0))
@@ -289,7 +289,7 @@ class Shares:
     friction, friction_by_chance : float
         Both together, negative where they drive the motion; and the friction that the residual
         alone would show.
-    left, noise : float
+    residual, noise : float
         Residual, and fast noise, over the swing of the effort.
     """
 
@@ -301,7 +301,7 @@ class Shares:
     dry: float
     friction: float
     friction_by_chance: float
-    left: float
+    residual: float
     noise: float
 
     @classmethod
@@ -311,7 +311,7 @@ class Shares:
         effort, ones = root[:, EFFORT], root[:, CONSTANT]
         swing = float(np.sqrt(max(effort @ effort - (effort @ ones) ** 2 / count, 1e-300)))
         parts = [root[:, k] for k in (INERTIA, GRAVITY, VELOCITY, DIRECTION)]
-        found, doubts, left = fitted(effort, [*parts, ones])
+        found, doubts, residual = fitted(effort, [*parts, ones])
         share, doubt = found[1], doubts[1]
         if _is_steady(root, parts[1]):
             # A weight that hardly changes cannot be separated from constants, and is one with the
@@ -325,7 +325,7 @@ class Shares:
         return cls(found[0], doubts[0], share, doubt,
                    float(np.sign(found[2]) * np.linalg.norm(viscous)) / swing,
                    float(np.linalg.norm(dry)) / swing, friction / swing,
-                   left * float(np.sqrt(2 / count)) / swing, left / swing,
+                   residual * float(np.sqrt(2 / count)) / swing, residual / swing,
                    noise * float(np.sqrt(count)) / swing)
 
     @property
@@ -374,7 +374,7 @@ class Shares:
             return table.COMMAND
         if abs(self.gravity) + self.gravity_doubt < table.LEFT_GRAVITY and not self.compliance:
             return table.WITHOUT_GRAVITY
-        is_exact = self.noise < table.LEAST_NOISE or self.left < table.LEAST_LEFT
+        is_exact = self.noise < table.LEAST_NOISE or self.residual < table.LEAST_LEFT
         return table.NOISE_FREE if is_exact else ''
 
 
@@ -426,7 +426,7 @@ def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[f
     used = np.flatnonzero(sizes > 0)
     unit = matrix[:, used] / sizes[used]
     solution = np.linalg.lstsq(unit, effort, rcond=CONDITION)[0]
-    left = float(np.linalg.norm(effort - unit @ solution))
+    residual = float(np.linalg.norm(effort - unit @ solution))
     values, doubts = [0.0] * len(columns), [np.inf] * len(columns)
     for k, column in enumerate(used):
         others = np.delete(unit, k, axis=1)
@@ -434,5 +434,5 @@ def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[f
         alone = float(np.linalg.norm(beyond))
         if alone > 10 * CONDITION:
             values[column] = float(solution[k] / sizes[column])
-            doubts[column] = left / (alone * float(sizes[column]))
-    return values, doubts, left
+            doubts[column] = residual / (alone * float(sizes[column]))
+    return values, doubts, residual

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Findings about a recording: units, signs or order other than its names say."""
+"""Findings about a recording: units, signs or order that differ from its names."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | 
 
 def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]:
     """Return the findings that efforts are no measurement."""
-    return [finding for each in findings for finding in each if isinstance(finding, NoMeasurement)]
+    return [finding for some in findings for finding in some if isinstance(finding, NoMeasurement)]
 
 
 class OtherReading(Mistake):
@@ -171,7 +171,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
 def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterator[OtherReading]:
     """Yield recorded velocities that are a multiple of the derivatives of positions.
 
-    All alike they contradict the unit or rate of times; else their own unit or sign is another.
+    If all are alike, they contradict the unit or rate of times, otherwise their own unit or sign.
     """
     factors = {} if excerpt is None else velocity_factors(excerpt)
     common = float(np.median([*factors.values()])) if factors else 0.0
@@ -179,17 +179,17 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
     if columns is not None and common > 0 and all(
             near(factor, [common]) for factor in factors.values()):
         units = [*table.TIMES, *(1 / unit for unit in table.TIMES)]
-        rate, said = columns.rate, ''
+        rate, reason = columns.rate, ''
         if rate is not None and not near(common, (1.0, *table.VELOCITY_UNITS)):
             value = float(f'{rate * common:.3g}')
-            key, said = 'rate', f'there were {value:g} samples per second, not {rate:g}'
+            key, reason = 'rate', f'there were {value:g} samples per second, not {rate:g}'
         # No velocity of an angle is in thousandths.
         elif rate is None and all(unit.turns for unit in model.units) and near(common, units):
-            key, said = 'time_scale', 'the times were in another unit'
+            key, reason = 'time_scale', 'the times were in another unit'
             value = (columns.time_scale or 1.0) / near(common, units)
-        if said:
+        if reason:
             yield OtherReading('rate', 1, f'the recorded velocities are {common:.4g} times the '
-                               f'derivatives of the positions, as if {said}',
+                               f'derivatives of the positions, as if {reason}',
                                scales=(('', key, value),))
             return
     groups: dict[float, list[int]] = {}
@@ -313,7 +313,7 @@ def knows_forces(model: DriveModel) -> bool:
 
 
 def find_shares(model: DriveModel) -> Iterator[OtherReading]:
-    """Yield efforts that are a share of a torque or force that no one has named."""
+    """Yield efforts that are a share of an unknown torque or force."""
     group = [d for d, drive in enumerate(model.drives) if is_share(_as_read(model, drive))]
     if group:
         named_so = ', '.join(str(_as_read(model, model.drives[d]).names['effort']) for d in group)

@@ -45,9 +45,9 @@ class Links:
         found = cls(unknown, unknown)
         for length in (step for step in table.LENGTHS_OF_STEPS if (
                 step < len(time) // 4 and len(time) >= table.LEAST_ROWS)):
-            change, covered = (each[length:] - each[:-length] for each in (values, area))
+            change, covered = (part[length:] - part[:-length] for part in (values, area))
             change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
-            sizes, areas = (np.sum(each ** 2, axis=0) for each in (change, covered))
+            sizes, areas = (np.sum(part ** 2, axis=0) for part in (change, covered))
             product = np.where(both := np.outer(sizes, areas), change.T @ covered, np.nan)
             correlation = product / np.sqrt(np.where(both, both, 1.0))
             better = ~(np.abs(correlation) <= np.abs(found.correlation)) & np.isfinite(correlation)
@@ -164,7 +164,7 @@ def lag(values: Array, other: Array) -> int | None:
     """Return by how many samples other values come later; None where they do not move alike."""
     values, other = np.nan_to_num(values), np.nan_to_num(other)
     step = max(_step(values), _step(other))
-    first, second = (each[step:] - each[:-step] for each in (values, other))
+    first, second = (part[step:] - part[:-step] for part in (values, other))
     count = len(first) - table.LONGEST_LAG
     if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
         return None
@@ -190,7 +190,7 @@ def measured(values: Array, blocks: Sequence[Sequence[int]]) -> int:
     """
     lags = [[lag(values[:, first], values[:, other]) for first, other in zip(
         blocks[0], block, strict=True)] for block in blocks]
-    alike = [k for k, each in enumerate(lags) if k == 0 or None not in each]
+    alike = [k for k, found in enumerate(lags) if k == 0 or None not in found]
     rough = [roughness(values[:, block]) for block in blocks]
     least = table.ROUGHER * min(rough[k] for k in alike)
     return max(alike, key=lambda k: (float(np.median([lag or 0 for lag in lags[k]])),

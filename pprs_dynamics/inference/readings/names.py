@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the names of columns say: quantities, units, joints and who asked or measured."""
+"""Quantities, units, joints, and commands or measurements, by the names of columns."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _unit(name: str) -> tuple[str, float] | None:
 def _words(text: str) -> list[str]:
     parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', text.replace('_', ' '))  # not in mA
     found = re.findall(r'[^\W\d_]+|\d+|[°%‰]', parts.lower())
-    return [each for word in found for each in _split(word)]
+    return [part for word in found for part in _split(word)]
 
 
 def _split(word: str) -> list[str]:
@@ -79,21 +79,21 @@ def _split(word: str) -> list[str]:
 def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
                 ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
-    told = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
+    kinds = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
     for words in ({word for word in key if len(word) > 1}, {*key}):
-        # A single letter beside a word is a prefix of programmers.
-        told = told or {kind for kind, known in table.WORDS.items() if words & {*known}}
+        # A single letter next to a word is a prefix of programmers.
+        kinds = kinds or {kind for kind, known in table.WORDS.items() if words & {*known}}
     is_german = bool({*key} & {'ist', 'soll'})
-    if not told and is_german and 'm' in key:
-        told.add(EFFORT)
-    if not told and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
-        told.add(POSITION)  # "joint torque" is no position
-    if CURRENT in told and EFFORT in told:
-        told.discard(EFFORT)
+    if not kinds and is_german and 'm' in key:
+        kinds.add(EFFORT)
+    if not kinds and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
+        kinds.add(POSITION)  # "joint torque" is no position
+    if CURRENT in kinds and EFFORT in kinds:
+        kinds.discard(EFFORT)
     # The name of the joint alone is a position, as in `shoulder_pan`.
-    plain = not told and not {*key} - {'*', 'observation'} - table.MEASURED
-    fits = given is not None or quantity in told or (quantity == POSITION and plain)
-    if quantity == POSITION and VELOCITY in told:
+    plain = not kinds and not {*key} - {'*', 'observation'} - table.MEASURED
+    fits = given is not None or quantity in kinds or (quantity == POSITION and plain)
+    if quantity == POSITION and VELOCITY in kinds:
         fits = False
     if not fits or {*key} & table.OTHERS:
         return (-1.0,)
@@ -139,7 +139,7 @@ def scale_of(title: str, quantity: str) -> float | None:
 
 
 def is_share(columns: DriveColumns) -> bool:
-    """Return whether efforts are read as a share of what no one has said."""
+    """Return whether efforts are read as a share of an unknown effort."""
     title = columns.names.get(EFFORT)
     return isinstance(title, str) and f'<{table.SHARE}>' in words_of(title) and (
         columns.effort_scale in (1.0, scale_of(title, EFFORT)))

@@ -56,7 +56,7 @@ CLOSEST = 2e-4
 # Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
 MASSES, MASSES_MOST = 0.35, 7.0
 ALL_MASSES_MOST = 14.0  # that of all drives together: a guess of one mass is a guess of all
-SAME_BALANCE = 1e-3  # standard deviation of the weight of a single body beside its mass
+SAME_BALANCE = 1e-3  # standard deviation of the weight of a single body over its mass
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
 # Width in which friction turns over, as a share of a drive's root mean square of velocity.
@@ -87,7 +87,7 @@ CLOSE_FIT, CLOSEST_FIT = 2e-3, 6e-4
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
 RESTING = 0.01  # [rad/s, m/s] speed from which a drive moves, however wide friction turns over
-WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
+WEAK = 0.01  # efforts and swings that are this much smaller than others are no evidence
 
 # ------------------------------------------------------------------------- scales of efforts
 
@@ -116,7 +116,7 @@ BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 # ----------------------------------------------------------------------- columns by their names
 
 POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
-# Words of a title, and the quantity that they tell.
+# Words of a title, by the quantity that they name.
 WORDS = {
     POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
                'enc', 'encoder', 'ticks', 'th', 'winkel', 'lage', 'stellung', 'hub', 'weg'),
@@ -128,26 +128,26 @@ WORDS = {
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
 }
-# These tell of a position where nothing else is told.
+# Words of a position, where no word names a quantity.
 OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
-# The same of what may be measured beside.
+# Words of channels that are measured in addition.
 CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
                  'pressure': {'pressure', 'pressures'}}
 PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
-# Titles with one of these tell of something else than a joint's measured motion or effort.
+# Titles with one of these name neither a joint's measured motion nor its effort.
 OTHERS = frozenset((
     'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'temp', 'temperature',
     'temperatures', 'voltage', 'power', 'tcp', 'cartesian', 'pose', 'ee', 'twist', 'wrench',
     'gravity', 'limit', 'error', 'err', 'action', 'reward', 'index', 'episode', 'frame', 'done',
     'tracking'))
-# These tell of a command: taken only where nothing measured is there.
+# Words of commands, which are read only where nothing is measured.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded', 'ff',
     'feedforward'))
-# These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
+# Words of external torques, as drivers estimate them: read where no other effort is recorded.
 FROM_OUTSIDE = frozenset(('ext', 'external', 'contact', 'dist', 'disturbance'))
-# The same of what was filtered, and of what is before a gear.
+# Words of filtered quantities, and of those before a gear.
 SECONDARY = frozenset(('filtered', 'filt', 'smooth', 'smoothed', 'model', 'motor', 'rotor'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
@@ -184,7 +184,7 @@ COPY = 0.995  # correlation of the changes of a column with those of what it was
 ROUGHER = 1.5  # third differences of what has noise, over those of what has none
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
-NO_EFFORT = 0.25  # residual of a column that is none, beside one with less
+NO_EFFORT = 0.25  # residual of a column that is no effort, next to one with less
 LEAST_ROWS = 30
 COARSE = 8.0  # counts of an encoder by which a column changes, so that rounding does not matter
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
@@ -194,8 +194,8 @@ SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
 # --------------------------------------------------------------------------------- velocities
 
 ALIKE = 0.9  # correlation of a velocity with the derivative of its position
-VELOCITY_UNITS = (-1.0, *(sign * each for sign in (1, -1) for unit in (
-    math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6) for each in (unit, 1 / unit)))
+VELOCITY_UNITS = (-1.0, *(sign * factor for sign in (1, -1) for unit in (
+    math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6) for factor in (unit, 1 / unit)))
 NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
 RATE_OFF = 0.03  # relative error of a sampling rate that is reported
 
@@ -320,7 +320,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
                 if unit in COUNTS:
                     add('position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
                         few + 1, scale=scale, offset=-math.pi * np.isin(same, group))
-    # Angles in degrees beside lengths in millimetres: neither alone explains efforts.
+    # Angles in degrees together with lengths in millimetres: neither alone explains efforts.
     alone = [row for row in rows if row.kind == 'position_unit']
     rows += [second.after(first.after(rows[0])) for first, second in combinations(alone, 2)
              if len(first.drives) + len(second.drives) == len(drives)
@@ -363,7 +363,7 @@ def _position(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
 def families(drives: Sequence[str]) -> list[tuple[int, ...]]:
     """Return the places of drives whose names differ in their numbers alone, together."""
     stems = [re.sub(r'\d', '', drive) for drive in drives]
-    return [tuple(k for k, each in enumerate(stems) if each == stem)
+    return [tuple(k for k, other in enumerate(stems) if other == stem)
             for stem in dict.fromkeys(stems)]
 
 
