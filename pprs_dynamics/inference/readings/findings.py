@@ -148,9 +148,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
     elif not np.all(np.isin(scales, table.SCALES)):
         listed = ', '.join(f'{scale:.3g} ({drive})' for drive, scale in zip(
             drives, scales, strict=True) if scale != 1)
-        # Drives without weight and inertia show none of their own: another's is nearer than 1.
-        other = np.median(scales[scales != 1])
-        gains = ', '.join(f'{1 / (other if scale == 1 else scale):.3g}' for scale in scales)
+        gains = ', '.join(f'{1 / scale:.3g}' for scale in scales)
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
            f'amperes (then write effort_kind: current, and under robot  gain: [{gains}]), '
