@@ -59,7 +59,7 @@ def described(joints: Mapping[str, float], commands: Sequence[str], hardware: Ma
                     if name != 'plugin')
     interfaces = ''.join(
         f'<joint name="{name}">'
-        + ''.join(f'<command_interface name="{each}"/>' for each in commands)
+        + ''.join(f'<command_interface name="{command}"/>' for command in commands)
         + f'<state_interface name="position"><param name="initial_value">{start}</param>'
           '</state_interface>'
           '<state_interface name="velocity"><param name="initial_value">0.0</param>'
@@ -113,7 +113,7 @@ class Cell:
         """
         end = time.monotonic() + patience
         while not condition():
-            if any(each.poll() is not None for each in self._managers):
+            if any(manager.poll() is not None for manager in self._managers):
                 raise RuntimeError(f'a controller manager has ended; {self._last_lines()}')
             if time.monotonic() > end:
                 raise TimeoutError(f'{what}: not within {patience:g} s; {self.log[-3:]}; '
@@ -139,7 +139,7 @@ class Cell:
         assigned = [f'{key}:={str(value).lower() if isinstance(value, bool) else value}'
                     for key, value in parameters.items()]
         return self.run([executable(name)], *given,
-                        *(word for each in assigned for word in ('-p', each)))
+                        *(word for value in assigned for word in ('-p', value)))
 
     def _last_lines(self) -> str:
         return '; '.join(f'{file.name}: {file.read_text(errors="replace")[-300:]}'
@@ -262,7 +262,7 @@ class States:
         if not found:
             raise TimeoutError('no controller_state came')
         when, *rest = zip(*found, strict=True)
-        position, velocity, effort = (np.array(each) for each in rest)
+        position, velocity, effort = (np.array(row) for row in rest)
         return np.array(when) - moment, position, velocity, effort
 
 

@@ -83,9 +83,9 @@ def played(running: Cell, **parameters: Any) -> float:
 
 def codes(status: list[dict[str, Any]], since: float) -> str:
     """Return in words which codes a node has said since a moment, and the first reason."""
-    found = [each for each in status if each['at'] >= since]
-    first = next((each for each in found if each['code'] == 'CONTROLLER'), None)
-    order = list(dict.fromkeys(each['code'] for each in found))
+    found = [entry for entry in status if entry['at'] >= since]
+    first = next((entry for entry in found if entry['code'] == 'CONTROLLER'), None)
+    order = list(dict.fromkeys(entry['code'] for entry in found))
     return ' '.join(order) + (f': {first["message"].rpartition("follow: ")[2]}' if first else '')
 
 
@@ -113,7 +113,7 @@ def forward(rate: float) -> dict[str, Any]:
         status = beside(running, FORWARD)
         began = played(running, rate=rate)
         arrived = np.array(seen.rows)
-        found = sum(bool((np.abs(arrived - each).max(axis=1) < SAME).any()) for each in sent)
+        found = sum(bool((np.abs(arrived - point).max(axis=1) < SAME).any()) for point in sent)
         return {'sent': len(sent), 'seen at the drives': found, 'status': codes(status, began)}
 
 
@@ -246,7 +246,7 @@ def two_robots() -> dict[str, Any]:
                 demo=True, stop_time=STOP_TIME, joint_prefix=f'{side}_')
             running.wait(lambda side=side: statuses[side], f'{side} feedforward')
         players = [running.start('play_trajectory', '-r', f'__ns:=/{side}') for side in statuses]
-        running.wait(lambda: all(each.poll() is not None for each in players), 'paths', DEADLINE)
+        running.wait(lambda: all(p.poll() is not None for p in players), 'paths', DEADLINE)
         running.spin(0.5)
         for side, status in statuses.items():
             found[side] = {'accepted': status[-1]['counters']['accepted'],
@@ -290,12 +290,12 @@ def loop(rate: float, stiffness: float = 0.0, damping: float = 0.0) -> dict[str,
 
         def pass_on(command: Any) -> None:
             """Relay what the hardware publishes by name to what the robot takes."""
-            found = {name: np.array([dict(zip(command.name, values, strict=True))[each]
-                                     for each in DRIVES])
+            found = {name: np.array([dict(zip(command.name, values, strict=True))[drive]
+                                     for drive in DRIVES])
                      for name, values in (('position', command.position),
                                           ('effort', command.effort)) if len(values)}
             if set(found) != set(interfaces) or not all(
-                    np.isfinite(each).all() for each in found.values()):
+                    np.isfinite(values).all() for values in found.values()):
                 return
             late = age(command)
             ways['commands'].append(late)
@@ -329,18 +329,18 @@ def loop(rate: float, stiffness: float = 0.0, damping: float = 0.0) -> dict[str,
         # Its simulation has caught up with the clock, which what starts beside it holds up.
         running.wait(lambda: time.monotonic() - measured[-1][0] < CAUGHT_UP, 'the simulation')
         running.activate(BROADCASTER, JTC)
-        for each in ways.values():
-            each.clear()
+        for way in ways.values():
+            way.clear()
         activated = len(measured)
         running.spin(2.0)
-        sag = np.array([each for _, each in measured[activated:]]) - measured[activated][1]
+        sag = np.array([place for _, place in measured[activated:]]) - measured[activated][1]
         before = dict(robot[-1]['counters'])
         began = played(running, lead_in=2.0)
         when, reference, _, _ = states.since(began)
-        times = np.array([each for each, _ in measured]) - began
-        where = np.array([each for _, each in measured])
-        error = np.abs(np.array([reference[k] - where[np.abs(times - each).argmin()]
-                                 for k, each in enumerate(when)])).max(axis=1)
+        times = np.array([when for when, _ in measured]) - began
+        where = np.array([place for _, place in measured])
+        error = np.abs(np.array([reference[k] - where[np.abs(times - time).argmin()]
+                                 for k, time in enumerate(when)])).max(axis=1)
         counters = robot[-1]['counters']
         return {'sag [mm]': round(1e3 * float(np.abs(sag).max()), 3),
                 'error, rms and largest [mm]': [
@@ -456,7 +456,7 @@ def main() -> None:
         parser.error(f'ros2_control is not installed, or not sourced: {error}')
     print(f'versions: {found["versions"]}')
     for name, run in CASES.items():
-        if given.case and not any(name.startswith(each) for each in given.case):
+        if given.case and not any(name.startswith(case) for case in given.case):
             continue
         try:
             found[name] = run()
@@ -467,7 +467,7 @@ def main() -> None:
             print(f'  {key}: {value}', flush=True)
         if given.json:
             given.json.write_text(json.dumps(found, indent=1))
-    print(f'\n{Counter("failed" in each for each in found.values())[True]} cases failed to run')
+    print(f'\n{Counter("failed" in case for case in found.values())[True]} cases failed to run')
 
 
 if __name__ == '__main__':

@@ -53,8 +53,8 @@ class Watch:
 
     def others(self, *values: Any) -> None:
         """Look at positions, velocities, accelerations."""
-        for each in values:
-            array = np.asarray(each, dtype=float)
+        for numbers in values:
+            array = np.asarray(numbers, dtype=float)
             self.numbers += array.size
             self.bad += int((~np.isfinite(array)).sum())
 

@@ -96,7 +96,7 @@ def in_turns(floor: Stream, node: Stream, data: bytes, rate: float, seconds: flo
     for _ in range(ROUNDS):
         for name, stream in (('echo', floor), ('feedforward', node)):
             times[name].append(stream.steadily(data, rate, int(rate * seconds / ROUNDS)))
-    return {name: _percentiles(np.concatenate(each)) for name, each in times.items()}
+    return {name: _percentiles(np.concatenate(values)) for name, values in times.items()}
 
 
 def start_time(data: bytes, domain: int) -> float:

@@ -138,7 +138,7 @@ def run(
             # before it has come.
             possible = (old, new, older if old is None else None)
             found['wrong_answers'] += sum(
-                not any(_near(each, forces) for forces in possible) for each in answers)
+                not any(_near(answer, forces) for forces in possible) for answer in answers)
             if old is not None:
                 older = old
             old = new

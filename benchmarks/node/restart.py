@@ -67,7 +67,7 @@ def run(
 
 def _found(kills: int, unanswered: int, starts: list[float]) -> dict[str, Any]:
     return {'kills': kills, 'unanswered': unanswered,
-            'start_to_first_command_s': [round(each, 2) for each in starts]}
+            'start_to_first_command_s': [round(start, 2) for start in starts]}
 
 
 def passed(found: dict[str, Any]) -> bool:

@@ -59,7 +59,7 @@ def relative_below(model: DriveModel, recordings: list[Recording]) -> list[tuple
 
 def share(pairs: list[tuple[Array, Array]]) -> list[float]:
     """Return rms error over rms effort with its mean removed, by drive."""
-    error, effort = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    error, effort = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
     return [float(value) for value in np.sqrt((error ** 2).mean(axis=0)) / effort.std(axis=0)]
 
 

@@ -131,7 +131,7 @@ def by_effect(told: Sequence[tuple[Outcome, dict[str, bool]]]) -> list[str]:
         own = [judged for outcome, judged in singles if outcome['effect'] == name]
         others = [outcome for outcome, _ in singles if outcome['effect'] != name]
         drives = [judged['drives'] for judged in own if 'drives' in judged]
-        wrong = sum(name in [each['name'] for each in outcome['effects']] for outcome in others)
+        wrong = sum(name in [effect['name'] for effect in outcome['effects']] for outcome in others)
         lines.append(f'| `{name}` | {sum(judged["first_or_set"] for judged in own)} of {len(own)} '
                      f'| {f"{sum(drives)} of {len(drives)}" if drives else "-"} | '
                      f'{wrong} of {len(others)} |')
@@ -148,7 +148,7 @@ def by_pair(found: Sequence[Outcome]) -> str:
     def counted(name: str, other: str) -> str:
         own = [(outcome, judged) for outcome, judged in told if outcome['effect'] == name]
         right = sum(judged['first_or_set'] for _, judged in own)
-        taken = sum(other in [each['name'] for each in outcome['effects']]
+        taken = sum(other in [effect['name'] for effect in outcome['effects']]
                     and not judged['first_or_set'] for outcome, judged in own)
         return f'{right} of {len(own)} | {taken}'
 

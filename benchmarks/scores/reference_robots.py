@@ -267,7 +267,7 @@ def outcome_of(robot: Robot, reference: Reference, change: Change, seed: int, pa
 def judged(outcome: Outcome, key: str) -> dict[str, float]:
     """Return what is right about one of the two answers."""
     since = {**outcome, **outcome[key]}
-    names = [each['name'] for each in since['effects']]
+    names = [effect['name'] for effect in since['effects']]
     found = dict(judge({**since, 'truth': since['truth'] or [{'drives': None}]}))
     found['false'] = sum(name != outcome['effect'] for name in names)
     if not outcome['effect']:
@@ -301,7 +301,7 @@ def table(found: Sequence[Outcome]) -> str:
             if not own:
                 continue
             right = [judged(outcome, key) for outcome in own]
-            first = sum([each['name'] for each in o[key]['effects']][:1] == [o['effect']]
+            first = sum([effect['name'] for effect in o[key]['effects']][:1] == [o['effect']]
                         for o in own)
             cells = [first if own[0]['effect'] else sum(outcome['adequate'] for outcome in right)]
             for what in ('first_or_set', 'exact', 'holds'):

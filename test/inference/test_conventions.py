@@ -212,7 +212,7 @@ def read_as_told(model: DriveModel, folder: Path, run: Recording,
                  ) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
     readings = [m for m in find_mistakes(model, run) if isinstance(m, OtherReading)]
-    line = columns_line([scale for each in readings for scale in each.scales])
+    line = columns_line([scale for reading in readings for scale in reading.scales])
     write_recording(folder / 'run.csv', run)
     path = folder / 'corrected.yaml'
     path.write_text((folder / 'arm.yaml').read_text() + f'    {line}\n')

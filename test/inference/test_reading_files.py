@@ -196,8 +196,8 @@ def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = '
 def asked_about(folder: Path, head: str, *columns: np.ndarray, separator: str = ',',
                 urdf: str = ARM) -> FirstModel:
     """Write a table, and return the first model for it."""
-    cells = [column for each in columns for column in (
-        each.T if each.ndim == 2 else [each])]
+    cells = [column for group in columns for column in (
+        group.T if group.ndim == 2 else [group])]
     lines = [separator.join(cell if isinstance(cell, str) else f'{cell:.10g}' for cell in row)
              for row in zip(*cells, strict=True)]
     (folder / 'run.csv').write_text('\n'.join([head] * bool(head) + lines))
@@ -243,7 +243,7 @@ def test_seconds_and_their_fractions_may_be_columns_each(head: str, tmp_path: Pa
 def test_times_may_be_dates(form: str, title: str, tmp_path: Path) -> None:
     time, q, _, effort = run_of_arm()
     start = datetime(2026, 2, 13, 9, 59, 58)
-    dates = np.array([(start + timedelta(seconds=each)).strftime(form) for each in time.tolist()])
+    dates = np.array([(start + timedelta(seconds=s)).strftime(form) for s in time.tolist()])
     head = title and f'{"Datum;" * form.count(";")}{title};q1;q2;tau1;tau2'
     found = read_table(tmp_path, head, dates, q, effort, separator=';')
     np.testing.assert_allclose(found.time - found.time[0], time, atol=1e-6)

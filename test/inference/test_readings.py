@@ -48,7 +48,7 @@ def run(seed: int = 0) -> tuple[np.ndarray, ...]:
 def told(model: DriveModel, time: np.ndarray, q: np.ndarray, effort: np.ndarray) -> str:
     """Return all mistakes of a recording as one text."""
     found = find_mistakes(model, Recording.from_arrays('run', time, q, None, effort, model.drives))
-    return '; '.join(each.what for each in found)
+    return '; '.join(finding.what for finding in found)
 
 
 @pytest.mark.parametrize('static_friction', [0.0, 0.6])
@@ -174,8 +174,8 @@ def test_angles_in_degrees_beside_lengths_in_millimetres_are_read(tmp_path: Path
     effort = force + np.random.default_rng(3).normal(0, 0.1, q.shape)
     found = find_mistakes(model, Recording.from_arrays(
         'run', time, q * size / unit, None, effort, model.drives))
-    scales = {drive: value for each in found if isinstance(each, OtherReading)
-              for drive, _, value in each.scales}
+    scales = {drive: value for finding in found if isinstance(finding, OtherReading)
+              for drive, _, value in finding.scales}
     assert scales == pytest.approx(dict(zip(model.drives, unit, strict=True)))
 
 
@@ -188,7 +188,7 @@ def test_recorded_velocities_decide_between_units_of_positions(
     found = find_mistakes(arm, Recording.from_arrays(
         'run', time, np.round(q / unit), v, effort / [11.1, 25.7], DRIVES))
     assert f'{unit:.7g}' in '; '.join(
-        each.line + str(each.scales) for each in found if isinstance(each, OtherReading))
+        f.line + str(f.scales) for f in found if isinstance(f, OtherReading))
 
 
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
@@ -243,8 +243,8 @@ def test_errors_of_a_model_are_no_other_reading(factor: float, tmp_path: Path) -
         effort = random.uniform(0.7, 1.5) * force + random.normal(0, 0.1, q.shape)
         found = find_mistakes(model, Recording.from_arrays(
             'run', time, q * size * [factor, factor, 1.0], None, effort, model.drives))
-        others = [each for each in found if isinstance(each, OtherReading)]
-        assert {scale[1:] for each in others for scale in each.scales} <= (
+        others = [finding for finding in found if isinstance(finding, OtherReading)]
+        assert {scale[1:] for finding in others for scale in finding.scales} <= (
             set() if factor == 1 else {('position_scale', 1 / factor)}), others
         assert bool(others) == (factor != 1)
 

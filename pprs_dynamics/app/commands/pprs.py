@@ -170,7 +170,7 @@ def _module(command: str) -> ModuleType:
 
 
 def _summary(command: str) -> str:
-    """Return what a command does, from the first line of its module, which is not imported."""
+    """Return the first line of a command's module, which is not imported."""
     file = Path(__file__).with_name(f'{command.replace("-", "_")}.py')
     first = (ast.get_docstring(ast.parse(file.read_text(encoding='utf-8'))) or '').splitlines()[0]
     return first.split(': ', 1)[1]

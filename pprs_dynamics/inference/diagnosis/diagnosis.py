@@ -249,7 +249,7 @@ class SinceReference(JsonRecord):
 
     @classmethod
     def of(cls, reference: Reference, design: Design) -> SinceReference:
-        """Return it for a design with a reference."""
+        """Return what a reference covers and explains of the recordings of a design."""
         assert design.carried is not None
         error = design.residuals.error
         before, after = (np.nansum(forces ** 2, axis=0) for forces in (

@@ -63,7 +63,7 @@ class LiveEffect(JsonRecord):
                 and self.found.drives == other.found.drives)
 
     def sentence(self, every: tuple[str, ...]) -> str:
-        """Return what changed in words; `every` names all drives."""
+        """Return the change in words; `every` names all drives."""
         given = self.found.in_model
         values = ', '.join(
             f'{key} {with_uncertainty(estimate.value, estimate.std, estimate.unit)}'

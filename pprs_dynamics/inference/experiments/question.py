@@ -107,7 +107,7 @@ class FittedTerm:
                         + [1.0] * len(self.component.shape))
 
     def rows(self, design: Design) -> Rows:
-        """Return its columns on recordings or on a motion."""
+        """Return the columns of the term on recordings or on a motion."""
         c = self.component
         term = design.find_term(c.effect, c.drive, c.parameters)
         if c.centre:

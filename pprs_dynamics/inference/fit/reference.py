@@ -176,7 +176,7 @@ class Process:
         return cls(drive, states, at[rows], factor[rows]), factor
 
     def known(self, q: Array, v: Array, _: float) -> Array:
-        """Return its features in a motion, (M, R); see `Waves.known`."""
+        """Return the features of the process in a motion, (M, R); see `Waves.known`."""
         from scipy.linalg import solve_triangular  # here: commands start without it
 
         at = self.states.at(q, v, self.drive)
@@ -229,7 +229,7 @@ class Waves:
         return found
 
     def known(self, q: Array, v: Array, period: float) -> Array:
-        """Return its features in a motion, (M, 4 K).
+        """Return the features of the waves in a motion, (M, 4 K).
 
         Means over a sample, in which the wave turns on.
 

@@ -104,7 +104,7 @@ class SecondEncoders:
     @classmethod
     def of(cls, recordings: Sequence[FullRate], reconstructions: Sequence[Reconstruction],
            ) -> SecondEncoders:
-        """Return it for recordings and their motion as it was read."""
+        """Return wind-up and clearance for recordings and their motion as it was read."""
         read = [(run.transmitted, run.direction, found.windup) for run, found in zip(
             recordings, reconstructions, strict=False) if found.windup is not None]
         windups, clearances = {}, {}

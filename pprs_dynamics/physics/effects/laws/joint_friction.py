@@ -120,7 +120,7 @@ class ModelJointFriction(Effect):
         return state.friction_efforts(self.table(state.robot, state.reversal))
 
     def table(self, robot: Any, reversal: Reversal) -> Any:
-        """Return its friction as states of a robot take it, once for each way to turn over."""
+        """Return the friction of joints as states take it, for each law of reversal."""
         if reversal not in self._tables:
             self._tables[reversal] = robot.friction_table(self.blocks, reversal, is_own=True)
         return self._tables[reversal]
