@@ -30,17 +30,19 @@ C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, Prentice-Hall (1974)
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.bands import SINGLE_BANDS, FrequencyBands
+from pprs_dynamics.physics.mechanism.evaluation import run
 
 # Scoring ends once a full step promises to lower -2 ln of the likelihood by less; a step is halved
 # until it brings a share of what it promises (Armijo), or is shorter than the least.
 CONVERGED, MOST_STEPS, SUFFICIENT, LEAST_STEP = 1e-4, 30, 1e-4, 1e-4
-MOST_ACTIVE = 1000  # changes of the active set in a step
+MOST_ACTIVE, ROUNDED = 1000, 1e-13  # changes of the active set in a step; share that is rounding
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Exponents s of noise that goes on below the record, the prior odds of each against one corner, and
 # how far down S of a constant is taken. Share of constants beyond three standard deviations where
@@ -48,9 +50,11 @@ OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record
 # 0.0 % if it goes on for 16 records and 1.3 % for 50, random walks 0.8 %. A constant under white
 # noise counts 12 % less than it would if the noise were known. With equal odds, one under AR(1)
 # noise of 0.5 s beside white noise would count half.
-EXPONENTS, ODDS, CONTINUED_OCTAVES = np.array([0.5, 1.0, 1.5, 2.0]), np.exp(-3.0), 2
+EXPONENTS, ODDS, CONTINUED_OCTAVES = np.array([0.5, 1.0, 1.5, 2.0]), math.exp(-3.0), 2
 SLOPE_OCTAVES, LEAST_PEERS = 3, 3  # lowest ones, and drives, of which the median slope is taken
-DESCRIBED = 6  # steps of scoring to a description: its two amplitudes change by 1 % after them
+# Steps of scoring to a description, whose two amplitudes change by 1 % after them; the best of the
+# last few counts.
+DESCRIBED, COMPARED = 6, 2
 SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
 LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: no spectrum is 0
 # [N^2], of a rounding of 1e-12 N, which nothing resolves: squares of it are no zeros yet.
@@ -109,29 +113,10 @@ class NoiseShapes:
 
     def _of_constant(self, power: Array) -> Array:
         """Return the noise of a constant, (D,), of the other bands' spectra (D, B - 1) [N^2]."""
-        counts, slow, of_constant = self.counts[1:], self.described[:, 1:], self.described[:, 0]
-        least = LEAST_SHARE * power.mean(axis=1)[:, None] + LEAST_POWER
-        seen = power[:, None]
-        # Of white noise and of slow noise, (D, K): best fit of Whittle's likelihood.
-        white = np.repeat(power[:, -1:], len(slow), axis=1)
-        grown = np.maximum(power[:, :1] - white, least)
-        found, deviance = white, np.full(white.shape, np.inf)
-        for _ in range(DESCRIBED):
-            spectrum = white[..., None] + grown[..., None] * slow
-            after = (np.log(spectrum) + seen / spectrum) @ counts
-            is_better = after < deviance
-            deviance = np.where(is_better, after, deviance)
-            found = np.where(is_better, white + grown * of_constant, found)
-            weight = counts / spectrum ** 2
-            sloped = weight * slow
-            a, b, c = (rows.sum(axis=-1) for rows in (weight, sloped, sloped * slow))
-            x, y = ((rows * seen).sum(axis=-1) for rows in (weight, sloped))
-            white = np.maximum((c * x - b * y) / np.maximum(a * c - b ** 2, 1e-9 * a * c), least)
-            grown = np.maximum((y - b * white) / c, least)
-            white = np.maximum((x - b * grown) / a, least)
-        odds = np.where(np.arange(len(slow)) < len(self.corners), 1.0, ODDS)
-        weight = odds * np.exp((deviance.min(axis=1)[:, None] - deviance) / 2)
-        mean: Array = (weight * found).sum(axis=1) / weight.sum(axis=1)
+        mean = np.empty(len(power))
+        run(extrapolate, np.ascontiguousarray(power), self.counts[1:],
+            np.ascontiguousarray(self.described[:, 1:]), self.described[:, 0].copy(),
+            len(self.corners), np.empty((3, len(self.described))), mean)
         return mean
 
     def start(self, squares: Array, counts: Array) -> Array:
@@ -157,52 +142,213 @@ class NoiseShapes:
         steps : int
             At most: a regression that is fitted anew does not need the end of the way.
         """
-        phi = self.at_bands[:, 1:]
-        squares, free = squares[:, 1:], np.maximum(
+        squares, free = squares[:, 1:].copy(), np.maximum(
             counts[:, 1:] - leverage[:, 1:], 0.02 * counts[:, 1:])
         least = LEAST_SHARE * squares.sum(axis=1) / np.maximum(free.sum(axis=1), 1) + LEAST_POWER
-        return _scored(amplitudes, squares, free, least[:, None], phi, steps)
+        found: Array = np.maximum(amplitudes, least[:, None])
+        size, bands = self.at_bands.shape
+        run(maximise_likelihood, found, squares, free, least, self.at_bands[:, 1:].copy(), steps,
+            np.empty((3, bands)), np.empty((5, size)), np.empty((2, size, size)))
+        return found
 
 
-def _scored(amplitudes: Array, squares: Array, free: Array, least: Array, phi: Array,
-            steps: int) -> Array:
-    """Return the amplitudes of all drives that maximise the likelihood, (D, J + 1)."""
-    from scipy.optimize import nnls  # here: commands that fit no noise start without it
+def extrapolate(power: Array, counts: Array, slow: Array, of_constant: Array, corners: int,
+                work: Array, mean: Array) -> None:
+    """Write the noise of a constant that spectra below their bands have: a loop over drives.
 
-    found = np.maximum(amplitudes, least)
-    going = np.arange(len(found))  # drives that have not converged
-    before = _deviance(found @ phi, squares, free)
-    for _ in range(steps):
-        a, r2, f, low = found[going], squares[going], free[going], least[going]
-        power = a @ phi
-        # Scoring is a regression of the bands' mean squares on the shapes, whose weights follow
-        # from the last spectrum; that amplitudes are not negative is exact.
-        root = np.sqrt(f) / power
-        design = root[:, None] * phi
-        scale = np.sqrt(np.sum(design ** 2, axis=2))
-        wanted = root * (r2 / np.maximum(f, 1e-300) - low * phi.sum(axis=0))
-        above = np.stack([nnls(rows.T, target, maxiter=MOST_ACTIVE)[0]
-                          for rows, target in zip(design / scale[:, :, None], wanted, strict=True)])
-        step = low + above / scale - a
-        promised = np.sum((step @ phi) * (r2 / power ** 2 - f / power), axis=1)
-        share = np.where(promised < CONVERGED, 0.0, 1.0)
-        while True:
-            after = _deviance((a + share[:, None] * step) @ phi, r2, f)
-            short = after > before[going] - SUFFICIENT * share * promised
-            if not np.any(short & (share > 0)):
+    Parameters
+    ----------
+    power : (D, B) array
+        Spectra [N^2].
+    counts : (B,) array
+        Coefficients in the bands.
+    slow : (K, B) array
+        Spectra of slow noise that describe a whole spectrum together with white noise.
+    of_constant : (K,) array
+        What a constant has of them.
+    corners : int
+        How many of them have a corner.
+    work : (3, K) array
+    mean : (D,) array
+        Written to [N^2].
+    """
+    bands = power.shape[1]
+    for d in range(power.shape[0]):
+        least = LEAST_POWER
+        for b in range(bands):
+            least += LEAST_SHARE * power[d, b] / bands
+        lowest = math.inf
+        for k in range(slow.shape[0]):
+            # Of white noise and of slow noise: best fit of Whittle's likelihood.
+            white = power[d, bands - 1]
+            grown = max(power[d, 0] - white, least)
+            found, deviance = white, math.inf
+            for step in range(DESCRIBED):
+                after = a = b2 = c = x = y = 0.0
+                for b in range(bands):
+                    spectrum = white + grown * slow[k, b]
+                    inverse = 1 / spectrum
+                    if step >= DESCRIBED - COMPARED:
+                        after += counts[b] * (math.log(spectrum) + power[d, b] * inverse)
+                    weight = counts[b] * inverse * inverse
+                    sloped = weight * slow[k, b]
+                    a += weight
+                    b2 += sloped
+                    c += sloped * slow[k, b]
+                    x += weight * power[d, b]
+                    y += sloped * power[d, b]
+                if step >= DESCRIBED - COMPARED and after < deviance:
+                    deviance, found = after, white + grown * of_constant[k]
+                white = max((c * x - b2 * y) / max(a * c - b2 * b2, 1e-9 * a * c), least)
+                grown = max((y - b2 * white) / c, least)
+                white = max((x - b2 * grown) / a, least)
+            work[0, k], work[1, k] = deviance, found
+            lowest = min(lowest, deviance)
+        total = mean[d] = 0.0
+        for k in range(slow.shape[0]):
+            weight = math.exp((lowest - work[0, k]) / 2) * (1.0 if k < corners else ODDS)
+            total += weight
+            mean[d] += weight * work[1, k]
+        mean[d] /= total
+
+
+def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array, phi: Array,
+                        steps: int, bands: Array, sizes: Array, grams: Array) -> None:
+    """Move amplitudes to where their likelihood is highest: a loop over drives.
+
+    Scoring is a regression of the bands' mean squares on the shapes, whose weights follow from the
+    last spectrum; that amplitudes are not below the least is exact.
+
+    Parameters
+    ----------
+    found : (D, J) array
+        Amplitudes to start from, written to [N^2].
+    squares, free : (D, B) array
+        Sums of squares of the residual, and degrees of freedom, in the bands.
+    least : (D,) array
+        That every amplitude keeps [N^2].
+    phi : (J, B) array
+    steps : int
+        At most.
+    bands : (3, B) array
+    sizes : (5, J) array
+    grams : (2, J, J) array
+        Work space.
+    """
+    power, root, change = bands[0], bands[1], bands[2]
+    gram, side, above = grams[0], sizes[0], sizes[1]
+    for d in range(found.shape[0]):
+        before = 0.0
+        for b in range(phi.shape[1]):
+            power[b] = 0.0
+            for j in range(phi.shape[0]):
+                power[b] += found[d, j] * phi[j, b]
+            before += free[d, b] * math.log(power[b]) + squares[d, b] / power[b]
+        for _ in range(steps):
+            for b in range(phi.shape[1]):
+                root[b] = free[d, b] / (power[b] * power[b])
+                change[b] = squares[d, b] / max(free[d, b], 1e-300)
+                for j in range(phi.shape[0]):
+                    change[b] -= least[d] * phi[j, b]
+            for i in range(phi.shape[0]):
+                side[i] = 0.0
+                for b in range(phi.shape[1]):
+                    side[i] += root[b] * phi[i, b] * change[b]
+                for j in range(i + 1):
+                    total = 0.0
+                    for b in range(phi.shape[1]):
+                        total += root[b] * phi[i, b] * phi[j, b]
+                    gram[i, j] = gram[j, i] = total
+            solve_non_negative(gram, side, above, sizes[2:], grams[1])
+            promised = 0.0
+            for b in range(phi.shape[1]):
+                change[b] = 0.0
+                for j in range(phi.shape[0]):
+                    change[b] += (least[d] + above[j] - found[d, j]) * phi[j, b]
+                promised += change[b] * (squares[d, b] / power[b] - free[d, b]) / power[b]
+            share = 0.0 if promised < CONVERGED else 1.0
+            after = before
+            while share > 0.0:
+                after = 0.0
+                for b in range(phi.shape[1]):
+                    trial = power[b] + share * change[b]
+                    after += free[d, b] * math.log(trial) + squares[d, b] / trial
+                if after <= before - SUFFICIENT * share * promised:
+                    break
+                share = share / 2 if share > LEAST_STEP else 0.0
+            if share == 0.0:
                 break
-            share = np.where(short, np.where(share > LEAST_STEP, share / 2, 0.0), share)
-        found[going], before[going] = a + share[:, None] * step, after
-        going = going[share > 0]
-        if not len(going):
-            break
-    return found
+            before = after
+            for j in range(phi.shape[0]):
+                found[d, j] += share * (least[d] + above[j] - found[d, j])
+            for b in range(phi.shape[1]):
+                power[b] += share * change[b]
 
 
-def _deviance(power: Array, squares: Array, free: Array) -> Array:
-    """Return -2 ln of the likelihood of spectra (D, B), (D,)."""
-    deviance: Array = np.sum(free * np.log(power) + squares / power, axis=1)
-    return deviance
+def solve_non_negative(gram: Array, side: Array, found: Array, sizes: Array, factor: Array,
+                       ) -> None:
+    """Write x that minimises x' G x - 2 x' s where x >= 0, by the active set of Lawson and Hanson.
+
+    Parameters
+    ----------
+    gram : (J, J) array
+        G
+    side : (J,) array
+        s
+    found : (J,) array
+        x, written to.
+    sizes : (3, J) array
+    factor : (J, J) array
+        Work space.
+    """
+    size, trial, rest, chosen = len(side), sizes[0], sizes[1], sizes[2]
+    most = 0.0  # slope, in units in which G has a diagonal of 1
+    for i in range(size):
+        found[i] = chosen[i] = 0.0
+        rest[i] = side[i]
+        most = max(most, abs(side[i]) / math.sqrt(gram[i, i]))
+    for _ in range(MOST_ACTIVE):
+        new, steepest = -1, ROUNDED * most
+        for i in range(size):
+            if chosen[i] == 0.0 and rest[i] > steepest * math.sqrt(gram[i, i]):
+                new, steepest = i, rest[i] / math.sqrt(gram[i, i])
+        if new < 0:
+            return
+        chosen[new] = 1.0
+        while True:
+            # Cholesky's factor of the chosen ones; 0 for those that others explain to rounding.
+            for i in range(size):
+                trial[i] = side[i]
+                for j in range(i + 1):
+                    factor[i, j] = 0.0
+                    if chosen[i] == chosen[j] == 1.0:
+                        factor[i, j] = gram[i, j]
+                        for k in range(j):
+                            factor[i, j] -= factor[i, k] * factor[j, k]
+                        if i > j:
+                            factor[i, j] /= factor[j, j]
+                        else:
+                            factor[i, i] = math.sqrt(max(factor[i, i], ROUNDED * gram[i, i]))
+                for j in range(i):
+                    trial[i] -= factor[i, j] * trial[j]
+                trial[i] = trial[i] / factor[i, i] if chosen[i] == 1.0 else 0.0
+            share, nearest = 1.0, -1
+            for i in range(size - 1, -1, -1):
+                if chosen[i] == 1.0:
+                    for j in range(i + 1, size):
+                        trial[i] -= factor[j, i] * trial[j]
+                    trial[i] /= factor[i, i]
+                    if trial[i] <= 0.0 and found[i] <= share * (found[i] - trial[i]):
+                        share, nearest = found[i] / (found[i] - trial[i]), i
+            for i in range(size):
+                found[i] += share * (trial[i] - found[i])
+            if nearest < 0:
+                break
+            found[nearest] = chosen[nearest] = 0.0
+        for i in range(size):
+            rest[i] = side[i]
+            for j in range(size):
+                rest[i] -= gram[i, j] * found[j]
 
 
 @dataclass(frozen=True)
