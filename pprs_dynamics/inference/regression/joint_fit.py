@@ -13,6 +13,10 @@ with Gaussian priors of precision Lambda about 0 has the penalised deviance
 
 -2 ln of the likelihood with the coefficients integrated out (restricted likelihood), but for a
 constant. Coefficients and noise are fitted in turn until it stands still.
+
+References
+----------
+D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12 (1965) 547-560.
 """
 
 from __future__ import annotations
@@ -49,6 +53,7 @@ LEAST_POSES = 20  # that are held: their errors are independent
 # last one having changed it by less than the second; rounds are bounded.
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
 NOISE_STEPS = 2  # of the noise in a round
+MOST_BEYOND, MOST_BACK = 2.0, 0.6  # of the last round's change of the noise, when it is accelerated
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 8000  # products of blocks on a drive, both ways, that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
@@ -257,12 +262,14 @@ class Regression:
         system, shapes = self.system(blocks), self.noise_shapes
         found = self._solved(system, blocks, shapes.start(np.stack([
             drive.squares for drive in system.drives]), self.counts) if start is None else start)
-        last = np.inf
+        last, steps = np.inf, list[tuple[Array, Array]]()
         for _ in range(MOST_ROUNDS - 1):
             before = found.deviance
-            found = self._solved(system, blocks, shapes.fitted(
-                found.amplitudes, found.squares, self.counts,
-                system.leverage(found.covariance, found.spectra), NOISE_STEPS))
+            fitted = shapes.fitted(found.amplitudes, found.squares, self.counts,
+                                   system.leverage(found.covariance, found.spectra), NOISE_STEPS)
+            steps = [*steps[-1:], (fitted, np.log(fitted @ shapes.at_bands[:, 1:]
+                                                  / found.spectra[:, 1:]))]
+            found = self._solved(system, blocks, self._accelerated(*steps))
             change = abs(before - found.deviance)
             # Changes fall as a geometric series: the next one is change^2 / last.
             if change < CONVERGED or (change < last and change ** 2 < CONVERGED * last / 2
@@ -270,6 +277,21 @@ class Regression:
                 break
             last = change
         return found
+
+    def _accelerated(self, before: tuple[Array, Array], last: tuple[Array, Array] | None = None,
+                     ) -> Array:
+        """Return amplitudes (D, J + 1) to go on with (Anderson's method of depth 1, by drive).
+
+        Of those fitted in the last rounds, and by how much the logarithms of their power (D, B - 1)
+        moved. Without it, noise that columns explain as well changes back and forth for ever.
+        """
+        if last is None:
+            return before[0]
+        change, counts = last[1] - before[1], self.counts[:, 1:]
+        share = np.clip(np.sum(counts * last[1] * change, axis=1) / np.maximum(
+            np.sum(counts * change ** 2, axis=1), 1e-12), -MOST_BEYOND, MOST_BACK)
+        mixed = last[0] - share[:, None] * (last[0] - before[0])
+        return np.where(mixed > 0, mixed, np.minimum(last[0], before[0]))
 
     def at(self, blocks: Sequence[Block], noise: JointFit | Array) -> JointFit:
         """Return the fit of blocks under the noise of another fit, or of given amplitudes."""
