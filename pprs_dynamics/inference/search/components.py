@@ -233,12 +233,7 @@ class Components:
     def score_test(self) -> ScoreTest[Component]:
         """All that more than one drive feels; computed when asked for."""
         shared = [*self.structure, *self.spanning]
-        blocks = [self.block(component) for component in shared]
-        ends = np.cumsum([block.size for block in blocks]).tolist()
-        rows = self.regression.joined(blocks).rows
-        return ScoreTest(self.regression, {d: of.astype(np.float32) for d, of in rows.items()}, [
-            Entry(component, tuple(range(end - block.size, end)), block.precision, block.mean)
-            for component, block, end in zip(shared, blocks, ends, strict=True)])
+        return ScoreTest.of_blocks(self.regression, shared, list(map(self.block, shared)))
 
     def shared_offers(self, fit: JointFit) -> list[tuple[Component, float]]:
         """Return what more than one drive feels, with its gains at the noise of a fit."""

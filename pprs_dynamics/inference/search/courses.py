@@ -199,9 +199,7 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
             if np.any(force[:, d])}
         if not rows:
             continue
-        every = {d: rows.get(d, np.zeros((len(courses), len(series)), dtype=np.float32))
-                 for d, series in fits.regression.series.items()}
-        test = ScoreTest(fits.regression, every,
+        test = ScoreTest(fits.regression, rows,
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
         # A stretch of no more samples than coefficients can be explained by anything.
         told = lengths > sum(len(component.names) for component in candidate.components)
@@ -253,19 +251,20 @@ def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
         rest = fitted.without(candidate)
         step = float(time[-1] - time[0]) / (
             STRETCHES if course.kind == DURING else ONSETS)
-        best = fits.at_noise_of(fitted, fitted.candidates).total
+        beside, best = fits.at_noise_of(fitted, rest).fit, -np.inf
         for _ in range(COURSE_HALVINGS):
             step /= 2
-            moved = [replace(course, begin=course.begin + by) for by in (-step, step)]
+            moved = [replace(course, begin=course.begin + by) for by in (-step, 0.0, step)]
             if course.kind == DURING:
-                moved += [replace(course, end=course.end + by) for course in (course, *moved)
+                moved += [replace(course, end=course.end + by) for course in moved
                           for by in (-step, step)]
-            for tried in moved:
-                if tried.begin < tried.end - step:
-                    total = fits.at_noise_of(
-                        fitted, (*rest, _with_course(candidate, tried))).total
-                    if total < best:
-                        best, course = total, tried
+            tried = [tried for tried in moved if tried.begin < tried.end - step]
+            blocks = [fits.regression.joined([
+                fits.components.block(replace(component, course=at))
+                for component in candidate.components]) for at in tried]
+            for labels, gains in ScoreTest.of_blocks(fits.regression, tried, blocks).gains(beside):
+                if gains.max() > best:
+                    best, course = float(gains.max()), labels[int(np.argmax(gains))]
         fitted = min(fitted, fits.evaluate((*rest, _with_course(candidate, course))),
                      key=lambda fitted: fitted.total)
     return fitted

@@ -14,7 +14,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
-from pprs_dynamics.inference.regression.normal_equations import term_gains
+from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
 
 Label = TypeVar('Label')
 
@@ -79,6 +79,16 @@ class ScoreTest(Generic[Label]):
         for entry in entries:
             sizes.setdefault(len(entry.rows), []).append(entry)
         self._groups = [self._group(listed) for listed in sizes.values()]
+
+    @classmethod
+    def of_blocks(cls, regression: Regression, labels: Sequence[Label], blocks: Sequence[Block],
+                  ) -> ScoreTest[Label]:
+        """Return the test of blocks, with their priors."""
+        ends = np.cumsum([block.size for block in blocks]).tolist()
+        rows = regression.joined(blocks).rows
+        return cls(regression, {d: of.astype(np.float32) for d, of in rows.items()}, [
+            Entry(label, tuple(range(end - block.size, end)), block.precision, block.mean)
+            for label, block, end in zip(labels, blocks, ends, strict=True)])
 
     @property
     def rows(self) -> Mapping[int, Array]:
