@@ -6,7 +6,7 @@ import {test} from 'node:test';
 import {cut, withGaps} from '../../pprs_dynamics/app/browser/curves.mjs';
 import {fromSlider, ordered, pays, toSlider} from '../../pprs_dynamics/app/browser/effects.mjs';
 import {rms, sentence} from '../../pprs_dynamics/app/browser/live.mjs';
-import {adoptionSaid} from '../../pprs_dynamics/app/browser/panels.mjs';
+import {adoptionText} from '../../pprs_dynamics/app/browser/panels.mjs';
 import {heat} from '../../pprs_dynamics/app/browser/robot.mjs';
 import {ticksOf, titled} from '../../pprs_dynamics/app/browser/scatter.mjs';
 import {placeOf} from '../../pprs_dynamics/app/browser/shares.mjs';
@@ -49,14 +49,14 @@ test('an adoption is said once, at its end', () => {
   const state = (job, adoption) => ({jobs: {adopt: {number: 1, what: 'x_y', error: '', ...job}}, adoption});
   const adoption = {effect: 'x_y', adopted: true, reason: 'it fell'};
   const running = state({is_running: true}), ended = state({is_running: false}, adoption);
-  assert.equal(adoptionSaid(null, {jobs: {}}), null);
-  assert.equal(adoptionSaid(null, running), null);
-  assert.deepEqual(adoptionSaid(running, ended), ['x y is adopted: it fell', true]);
-  assert.equal(adoptionSaid(ended, ended), null);
-  assert.match(adoptionSaid(running, state({is_cancelled: true}))[0], /called off/);
-  assert.deepEqual(adoptionSaid(running, state({error: 'no'})), ['no', false]);
+  assert.equal(adoptionText(null, {jobs: {}}), null);
+  assert.equal(adoptionText(null, running), null);
+  assert.deepEqual(adoptionText(running, ended), ['x y is adopted: it fell', true]);
+  assert.equal(adoptionText(ended, ended), null);
+  assert.match(adoptionText(running, state({is_cancelled: true}))[0], /called off/);
+  assert.deepEqual(adoptionText(running, state({error: 'no'})), ['no', false]);
   // One that began and ended between two looks.
-  assert.notEqual(adoptionSaid(ended, state({number: 2}, adoption)), null);
+  assert.notEqual(adoptionText(ended, state({number: 2}, adoption)), null);
 });
 
 test('a live robot is told in its unit, and one that is silent as that', () => {
