@@ -35,7 +35,7 @@ MOST_LEFT = 0.25  # of the squared error of each drive with the model's directio
 
 def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
     """Return the finding that gravity has another direction than in the model, by drive."""
-    plain = table.readings(model.drives, model.units)[0]
+    plain = Reading.plain(len(model.drives))
     for recording in recordings:
         excerpt = excerpt_of(recording, table.STRETCHES)
         row = None if excerpt is None else mounting_in(model, excerpt, plain, SAME_SIZE)
@@ -90,12 +90,13 @@ def mounting_in(model: DriveModel, excerpt: Excerpt, reading: Reading, same_size
     norm = float(np.linalg.norm(share))
     if not is_explained or abs(norm - 1) > same_size or _angle(share, given) < LEAST_TILT:
         return None
-    axis = np.eye(3)[np.argmax(np.abs(share))] * np.sign(share[np.argmax(np.abs(share))])
+    largest = np.argmax(np.abs(share))
+    axis = np.sign(share[largest]) * np.eye(3)[largest]
     gravity = size * axis if _angle(share, axis) < ALONG else (size / norm * share).round(1)
     found, known = (', '.join(f'{value + 0.0:g}' for value in vector)
                     for vector in (gravity, given))
     return replace(
-        table.readings(model.drives, model.units)[0], kind=MOUNTING, gravity=gravity,
+        Reading.plain(len(model.drives)), kind=MOUNTING, gravity=gravity,
         drives=tuple(range(len(model.drives))), cost=table.COST[MOUNTING],
         what=f'gravity in the base is ({found}) m/s² in this recording and ({known}) m/s² in the '
         'model: the robot is mounted in another direction')

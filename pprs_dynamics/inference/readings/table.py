@@ -250,6 +250,12 @@ class Reading:
     load: float = 0.0
     parts: tuple[Reading, ...] = ()
 
+    @classmethod
+    def plain(cls, count: int) -> Reading:
+        """Return the reading of so many drives as they are recorded."""
+        same, ones = np.arange(count), np.ones(count)
+        return cls('', '', (), 0.0, ones, np.zeros(count), same, same, ones)
+
     @property
     def kinds(self) -> set[str]:
         """Kinds of its mistakes: a load is none."""
@@ -293,8 +299,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         Whether all angles are whole numbers, as encoders count.
     """
     every = tuple(range(len(drives)))
-    same, zero, ones = np.arange(len(drives)), np.zeros(len(drives)), np.ones(len(drives))
-    rows = [Reading('', '', (), 0.0, ones, zero, same, same, ones)]
+    same = np.arange(len(drives))
+    rows = [Reading.plain(len(drives))]
 
     def add(kind: str, what: str, group: tuple[int, ...], more: float = 0.0, **changes: Any,
             ) -> None:
