@@ -61,12 +61,18 @@ def executable(name: str) -> str:
 def node_process(
     command: list[str], domain: int, log: Path, env: dict[str, str] | None = None,
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a node while the block lasts; end it with SIGINT, as Ctrl-C would."""
+    """Run a node while the block lasts; end it with SIGINT, as Ctrl-C would.
+
+    What the node said is printed where the block fails.
+    """
     with log.open('wb') as output:
         process = subprocess.Popen(
             command, env=env or environment(domain), stdout=output, stderr=subprocess.STDOUT)
         try:
             yield process
+        except BaseException:
+            print(f'{command[0]}, status {process.poll()}:\n{log.read_text(errors="replace")}')
+            raise
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)

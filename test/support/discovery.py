@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How soon DDS forgets a process that was killed: in tests sooner than by default."""
+"""How DDS finds and forgets processes in tests: over UDP, and soon when one was killed."""
 
 from __future__ import annotations
 
@@ -23,4 +23,5 @@ def in_a_hurry(folder: str) -> dict[str, str]:
     """Write the profile; return the environment in which participants have it."""
     file = Path(folder) / 'discovery.xml'
     file.write_text(PROFILE)
-    return {'FASTDDS_DEFAULT_PROFILES_FILE': str(file)}
+    # Shared memory is one for all domains and containers that run side by side.
+    return {'FASTDDS_DEFAULT_PROFILES_FILE': str(file), 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}

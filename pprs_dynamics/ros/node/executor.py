@@ -11,9 +11,11 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
 from rclpy.logging import get_logger
@@ -41,7 +43,8 @@ class StoppableExecutor(SingleThreadedExecutor):
     def stop(self) -> None:
         """End `spin` after the present callback; from any thread."""
         self._stopped.set_result(None)
-        self.wake()
+        with suppress(InvalidHandle):  # `spin` may have ended, and its owner destroyed all this
+            self.wake()
 
     def spin(self) -> None:
         """Execute callbacks until `stop` or shutdown."""
