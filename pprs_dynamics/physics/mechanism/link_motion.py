@@ -32,7 +32,13 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.state import StructureLoad
-from pprs_dynamics.physics.mechanism.structure import RANK, Structure, build_structure, opening
+from pprs_dynamics.physics.mechanism.structure import (
+    RANK,
+    Structure,
+    build_structure,
+    independent_rows,
+    opening,
+)
 from pprs_dynamics.physics.mechanism.tree_equations import Data, Integers, JointFriction, Loads
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -240,8 +246,9 @@ class ToolPose:
         m, (W, U) = at_home.motion, (jacobian[0, row] for jacobian in at_home.link_jacobians)
         self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
         linear, angular = U + np.cross(W, m.R[0, row] @ frame.p, axis=0), W
-        self.chosen = _independent(np.vstack((linear / structure.size,
-                                              (self.home.R.T @ angular)[::-1])))
+        self.chosen = independent_rows(
+            np.vstack((linear / structure.size, (self.home.R.T @ angular)[::-1])),
+            linear.shape[1], (np.s_[:SLIDES], np.s_[SLIDES:]), RANK)
         if not structure.loops or len(self.chosen) < len(t.drives):
             raise ModelError('robot.tool', structure.tool, 'be a link of a robot with loops whose '
                              'pose determines all drives, for a trajectory of its poses')
@@ -346,22 +353,6 @@ def _in_words(motion: PlatformMotion, sample: int) -> str:
     x, y, z = motion.position[sample]
     return (f'({x:.4g}, {y:.4g}, {z:.4g}) m, turned by '
             f'{np.degrees(np.hypot(motion.tilt[sample], motion.turn[sample])):.3g} degrees')
-
-
-def _independent(rows: Array) -> Integers:
-    """Return rows (6, D) that are independent, translations before rotations, in their order."""
-    chosen: list[int] = []
-    left = rows.copy()
-    for first, last in ((0, SLIDES), (SLIDES, len(rows))):
-        for _ in range(first, last):
-            sizes = np.linalg.norm(left[first:last], axis=1)
-            k = first + int(np.argmax(sizes))
-            if len(chosen) == rows.shape[1] or not sizes[k - first] > RANK:
-                break
-            direction = left[k] / sizes[k - first]
-            left = left - np.outer(left @ direction, direction)
-            chosen.append(k)
-    return np.sort(np.array(chosen, dtype=np.int64))
 
 
 def _tied_structure(structure: Structure, home: Frame, chosen: Integers) -> Structure:

@@ -196,9 +196,6 @@ class Closing:
         ModelError
             Where the drives do not determine the motion, or are not independent.
         """
-        # Here and not above: robots without loops need it not, and it takes long to import.
-        from scipy.linalg import null_space, qr
-
         _, J = self.derivatives(q)
         passive = np.setdiff1d(np.arange(len(q)), drives)
         J_p = J[:, passive]
@@ -210,7 +207,7 @@ class Closing:
                 'robot.drives', [self.names[c] for c in drives], 'be independent: the loops leave '
                 f'{freedoms} degrees of freedom at home to {len(drives)} drives, '
                 f'{len(drives) - redundant} of which can be given')
-        free = null_space(J_p, rcond=RANK) if len(J_p) else np.eye(len(passive))
+        free = np.linalg.svd(J_p)[2][rank:].T if len(J_p) else np.eye(len(passive))
         if free.shape[1]:
             moved = np.linalg.norm(moves[:, passive] @ free, axis=0)
             if np.max(moved, initial=0.0) > RANK:
@@ -228,8 +225,8 @@ class Closing:
         determined = passive[:0]
         condition = 1.0
         if rank:
-            rows = np.sort(qr(J_p.T, pivoting=True, mode='r')[1][:rank])
-            chosen = np.sort(qr(J_p[rows], pivoting=True, mode='r')[1][:rank])
+            rows = independent_rows(J_p, rank)
+            chosen = independent_rows(J_p[rows].T, rank)
             determined = passive[chosen]
             condition = float(np.linalg.cond(J_p[np.ix_(rows, chosen)]))
         held = np.setdiff1d(passive, determined)
@@ -244,6 +241,34 @@ def opening(kind: int, residual: float) -> str:
 
 def _rank(J: Array) -> int:
     return int(np.linalg.matrix_rank(J, tol=RANK * np.linalg.norm(J, 2))) if J.size else 0
+
+
+def independent_rows(rows: Array, most: int, groups: Sequence[slice] = (np.s_[:],),
+                     least: float = 0.0) -> Integers:
+    """Return rows (K, D) that are independent, by QR decomposition with pivoting, in their order.
+
+    Parameters
+    ----------
+    rows : (K, D) array
+    most : int
+        Of the independent ones.
+    groups : sequence of slice
+        Of the rows; those of the first are chosen first.
+    least : float
+        Size of what a row adds to those that are chosen already.
+    """
+    chosen: list[int] = []
+    left = rows.copy()
+    for group in groups:
+        for _ in rows[group]:
+            sizes = np.linalg.norm(left[group], axis=1)
+            k = int(np.argmax(sizes)) + (group.start or 0)
+            if len(chosen) == most or not sizes.max() > least:
+                break
+            direction = left[k] / sizes.max()
+            left = left - np.outer(left @ direction, direction)
+            chosen.append(k)
+    return np.sort(_integers(chosen))
 
 
 def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, q: Array) -> Model:
