@@ -42,7 +42,6 @@ from pprs_dynamics.simulation.injection import (
     Injection,
     PlainRobot,
 )
-from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.simulated_robot import SensorSettings
 
 # What of the catalogue can be injected into a 3-PPRS.
@@ -225,7 +224,7 @@ def simulated(model: DriveModel, robot: Mapping[str, Any],
               drive_width: Sequence[float] = (1.0,) * 6, passive_width: float = 1.0,
               ) -> DriveModel:
     """Return a robot with other numbers than the model's, and widths of reversal over its own."""
-    own = as_mechanism(DriveModel.from_parameters({**model.values, **robot}))
+    own = DriveModel.from_parameters({**model.values, **robot})
     reversal = own.reversal
     return replace(own, reversal=Reversal(
         tuple(np.multiply(drive_width, reversal.velocity).tolist()),

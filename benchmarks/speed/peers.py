@@ -17,6 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
+from random_states import masses_of
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
@@ -137,7 +138,7 @@ class Peer:
 
 def pinocchio_trees(robot: ThreePprs) -> Any:
     """Return the platform and three chains slide-lift-rod, each with its bodies."""
-    geometry, masses = robot.geometry, robot.masses
+    geometry, masses = robot.geometry, masses_of(robot)
     model, up = pin.Model(), np.array([0.0, 0.0, 1.0])
     model.gravity.linear = np.array(robot.gravity)
 
@@ -167,7 +168,7 @@ def pinocchio_trees(robot: ThreePprs) -> Any:
 
 def mujoco_trees(robot: ThreePprs) -> Any:
     """Return the platform and three chains slide-lift-rod, for MuJoCo's compiler."""
-    geometry, masses = robot.geometry, robot.masses
+    geometry, masses = robot.geometry, masses_of(robot)
     spec, up = mujoco.MjSpec(), np.array([0.0, 0.0, 1.0])
     spec.option.gravity = robot.gravity
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)

@@ -114,7 +114,8 @@ class MechanismEngine:
         for name, parameters in refused.items():
             self.carry(name, parameters)
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
-            if not np.array_equal(parameters, structure.inertial[row]):
+            if structure.description.path and not np.array_equal(
+                    parameters, structure.inertial[row]):
                 for name, (of, _) in placed.items():
                     if of == row:
                         self._set(int(self.model.body(name).id), np.zeros_like(parameters))
@@ -162,7 +163,8 @@ class MechanismEngine:
         rates = random.uniform(-1.0, 1.0, (3, 2, len(middle)))
         rates[0] *= SPAN * way * (0.1 if structure.loops else 1.0)
         motion = JointMotion(middle + rates[0], rates[1], rates[2], np.arange(2.0))
-        ours, theirs = model.mechanism(motion).transmitted, self.torques(motion)
+        ours, theirs = (model.robot.torques(motion.position, motion.velocity, motion.acceleration),
+                        self.torques(motion))
         off = np.abs(ours - theirs)
         if np.max(off) <= AGREEMENT * max(float(np.abs(theirs).max()), 1.0):
             return

@@ -21,6 +21,8 @@ from pprs_dynamics.errors import WorkspaceError, suggestion
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
+from pprs_dynamics.physics.mechanism.state import SLIDE
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injected_forms import (
@@ -553,9 +555,8 @@ def _joint_friction(run: Injection) -> Injected:
     closed = run.engine.closed(run.motion)
 
     def rows_of(name: str) -> Array:
-        return run.engine.friction(run.model.robot.friction_table(
-            {joint: {} for joint in groups[name]}, run.model.reversal), closed,
-            run.plain.carried).rows
+        return run.engine.friction(run.model.robot.tree_friction(
+            {name: {}}, run.model.reversal), closed, run.plain.carried).rows
 
     def speed_of(rows: Array) -> Array:
         return np.linalg.norm(np.einsum('nkiv,nv->nki', rows, closed.velocity), axis=2)
@@ -634,7 +635,7 @@ def _require_platform(model: DriveModel, name: str) -> None:
 
 def require_tool(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for an axis, which a force across it does not move."""
-    if not model.is_mechanism:
+    if model.kind == SLIDE:
         raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
 
 
@@ -678,7 +679,7 @@ def _lost_motion(run: Injection) -> Injected:
         joint = run.joint(1)
         span, load = run.size(0.01, 0.03) * run.shift_unit(joint), run.bodies[:, joint]
         # The link falls behind in its position alone, on which no force of an axis depends.
-        by_load = bool(run.model.is_mechanism and load.min() < -CROSSED * load.max() < 0
+        by_load = bool(run.model.kind != SLIDE and load.min() < -CROSSED * load.max() < 0
                        and run.random.integers(2))
         driver = load if by_load else run.motion.velocity[:, joint]
         return {'joint': joint, 'span': span, 'by_load': by_load,
@@ -839,22 +840,30 @@ NOT_IN_DRIVES = {*BODIES, 'coupled_drives', 'time_delay', 'effort_filter', 'ecce
 
 def guides(model: DriveModel) -> set[str]:
     """Return the drives whose friction follows the load across them."""
-    return {name for effect in model.effects if isinstance(effect, ModelJointFriction)
-            for name in effect.blocks if name in model.drives}
+    following = {name for effect in model.effects if isinstance(effect, ModelJointFriction)
+                 for name in effect.blocks if name in model.drives}
+    return following | {drive for drive, mu in zip(model.drives, np.broadcast_to(
+        model.friction.coefficient, len(model.drives)), strict=True) if mu}
+
+
+def own_joint_friction(model: DriveModel) -> JointFriction:
+    """Return the friction of all joints, driven or not, that the model file has."""
+    friction = model.friction
+    rows = np.broadcast_arrays(friction.viscous, friction.coulomb, friction.coefficient,
+                               np.zeros(len(model.drives)))[:3]
+    of_drives = {drive: dict(zip(('viscous', 'torque', 'coulomb'), numbers, strict=True))
+                 for drive, *numbers in zip(model.drives, *rows, strict=True)}
+    return JointFriction(*map(np.concatenate, zip(*(
+        model.robot.tree_friction(blocks, model.reversal) for blocks in (of_drives, *(
+            effect.blocks for effect in model.effects if isinstance(effect, ModelJointFriction)))),
+        strict=True)))
 
 
 def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion,
                  rounds: int = 1) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    v = motion.velocity
-    friction: Array = (
-        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
-        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
-        + np.asarray(model.offset.value))
-    for effect in model.effects:
-        if isinstance(effect, ModelJointFriction):
-            friction = friction + engine.joint_friction(
-                motion, effect.table(model.robot, model.reversal), rounds)
+    friction: Array = (model.robot.armature * motion.acceleration + model.offset + (
+        engine.joint_friction(motion, own_joint_friction(model), rounds)))
     return friction
 
 

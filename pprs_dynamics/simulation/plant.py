@@ -24,9 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.engine import MechanismEngine
@@ -48,9 +46,9 @@ from pprs_dynamics.simulation.injection import (
     links_that_weigh,
     named,
     one_able_joint,
+    own_joint_friction,
     require_tool,
 )
-from pprs_dynamics.simulation.platform import as_mechanism
 
 LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step
@@ -119,24 +117,15 @@ class Plant(Injecting):
     def __init__(self, model: DriveModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
-        self.model = as_mechanism(model)
-        self.engine = MechanismEngine(self.model)
-        self.structure = s = self.model.robot.structure
+        self.model = model
+        self.engine = MechanismEngine(model)
+        self.structure = s = model.robot.structure
         self._nominal = draw_motion(self.model, NOMINAL, 0)
         self._efforts = self.engine.torques(self._nominal)
         self.largest = np.abs(self._efforts).max(axis=0)
         self._guides = sorted(guides(self.model), key=s.drives.index)
-        reversal = self.model.reversal
-        viscous, coulomb, self._offset = (
-            np.broadcast_to(np.asarray(numbers, dtype=float), len(s.drives)) for numbers in (
-                self.model.friction.viscous, self.model.friction.coulomb, self.model.offset.value))
-        self._width = reversal.widths(len(s.drives))
-        of_drives = self.model.robot.friction_table(
-            {drive: {'viscous': viscous[d], 'torque': coulomb[d]}
-             for d, drive in enumerate(s.drives)}, reversal)
-        self._friction = JointFriction(*map(np.concatenate, zip(of_drives, *(
-            effect.table(self.model.robot, reversal) for effect in self.model.effects
-            if isinstance(effect, ModelJointFriction)), strict=True)))
+        self._offset, self._width = model.offset, model.reversal.widths(len(s.drives))
+        self._friction = own_joint_friction(model)
         self.inject(names, seed, scale)
         home, _ = s.room(np.pi)  # where motions that are drawn begin
         self.limits = self.model.limits

@@ -43,14 +43,14 @@ def motion(robot):
 
 def loads_of_joints(robot, forces):
     """Return what the tree of the robot's joints and closures transmits."""
-    free = np.full(6, np.inf)
-    tree, s = robot.as_mechanism((-free, free), free), forces.mechanism
-    return tree, tree.loads(tree.at(s.position, s.velocity, s.acceleration), None)
+    s = forces.mechanism
+    return robot.at(s.position, s.velocity, s.acceleration).loads(
+        robot.by_joint, robot.gravity_row)
 
 
 def reactions_on_platform(robot, forces):
     """Return the force of every rod on the platform, (N, 3, 3) [N]."""
-    return loads_of_joints(robot, forces)[1].F
+    return loads_of_joints(robot, forces).F
 
 
 # Reactions -----------------------------------------------------------------------------------
@@ -60,8 +60,7 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     chains, body = forces.mechanism.links, forces.mechanism.reactions
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
         robot.geometry.rod_length  # noqa: E741
-    slides, lifts, rods = (np.asarray(m)[:, None] for m in (
-        robot.masses.slides, robot.masses.lifts, robot.masses.rods))
+    slides, lifts, rods = robot.masses[:-1].reshape(3, 3, 1)
     c, s = chains.cos_u[..., None], chains.sin_u[..., None]
     u_dot, u_ddot = chains.u_dot[..., None], chains.u_ddot[..., None]
     along, swing = -c * e + s * UP, s * e + c * UP
@@ -119,8 +118,8 @@ def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
     velocities.
     """
     _, n = chain_vectors(robot.geometry)
-    tree, loads = loads_of_joints(robot, forces)
-    at_C = loads.f[:, [tree.structure.rows[f'hinge_{i}'] for i in (1, 2, 3)]]
+    loads = loads_of_joints(robot, forces)
+    at_C = loads.f[:, [robot.structure.rows[f'hinge_{i}'] for i in (1, 2, 3)]]
     rod = forces.mechanism.links.u_dot[..., None] * n
     relative = rod - motion.angular_velocity[:, None]
     moments = []

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import random_states as states
@@ -17,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.three_pprs.robot import condition_number
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs, condition_number
 
 POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
@@ -39,7 +37,8 @@ def home_pose():
 
 def forward(geometry, q):
     """Return poses of drive positions."""
-    return replace(states.paper_model().robot, geometry=geometry).motion_of_drives(q, 0 * q, 0 * q)
+    masses = states.random_masses(np.random.default_rng(0))
+    return ThreePprs.of(geometry, masses).motion_of_drives(q, 0 * q, 0 * q)
 
 
 def solve(geometry, motion):

@@ -36,7 +36,7 @@ def test_the_default_model_is_the_papers_robot() -> None:
     robot = DriveModel.load().robot
     assert (robot.geometry.base_radius, robot.geometry.platform_radius,
             robot.geometry.rod_length) == (0.15, 0.10, 0.30)
-    assert robot.masses.total == 2.0
+    assert robot.moved_mass == 2.0
     friction = DriveModel.load().values
     mu_p, s, d_r = 0.1, 0.00005, 0.01
     assert friction['friction.revolute.coulomb'] == pytest.approx(

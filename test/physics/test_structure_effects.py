@@ -10,7 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from random_states import ELBOWS, model_of, paper_model, random_motion, random_poses, random_robot
+from random_states import (
+    ELBOWS,
+    masses_of,
+    model_of,
+    paper_model,
+    random_motion,
+    random_poses,
+    random_robot,
+)
 from scipy.spatial.transform import Rotation
 
 from benchmarks.speed.peers import PinocchioPeer
@@ -19,6 +27,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.state import PLATFORM
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 EFFECTS = {name: paper_model().bound(effect) for name, effect in CATALOGUE.items()
            if issubclass(effect, StructureEffect) and PLATFORM in effect.acts_in}
@@ -58,7 +67,7 @@ def case(request):
 
 def changed_robot(name, robot):
     """Return a robot whose bodies or gravity differ by an effect."""
-    values, masses = VALUES[name], robot.masses
+    values, masses = VALUES[name], masses_of(robot)
     if name == 'base_tilt':
         tilt = Rotation.from_euler('xy', [values['x'], values['y']])
         return replace(robot, gravity=tuple(tilt.apply(robot.gravity)))
@@ -69,7 +78,7 @@ def changed_robot(name, robot):
         'payload_offset': {'centre': tuple(moved)},
         'link_mass': {'rods': tuple(np.add(masses.rods, VALUES['link_mass']['rods.mass']))},
         'platform_inertia': {'inertia': tuple(np.add(masses.inertia, more))}}
-    return replace(robot, masses=replace(masses, **changes[name]))
+    return ThreePprs.of(robot.geometry, replace(masses, **changes[name]), robot.gravity)
 
 
 @pytest.mark.parametrize('name', [

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,20 @@ import pytest
 import robots_with_loops as robots
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from model_recordings import with_effects
 from oracles.mujoco_loops import MujocoLoops
 from random_states import random_motion, without_compiler
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import (
+    JointFrictionEffect,
+    ModelJointFriction,
+)
+from pprs_dynamics.physics.mechanism.alike import proportional_joints
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_equations import solve
 
 SAMPLES = 30
@@ -102,35 +107,28 @@ def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str,
     assert answered > STEPS / 4
 
 
-def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, DriveModel]:
-    """Return the paper's robot in closed form, and as a tree with loops.
+def three_pprs() -> tuple[DriveModel, DriveModel]:
+    """Return the paper's robot in closed form, and by the equations of its tree with loops.
 
-    Friction of the drives follows their guides' loads where it is among that of the joints.
+    There friction of the drives is among that of the joints, whose loads it follows.
     """
-    paper = DriveModel.load()
-    values = {**paper.values, 'masses.inertia': (0.005, 0.006, 0.01, 0.0, 0.0, 0.0)}
-    paper = DriveModel.from_parameters(values)
-    path = HelicalPath()
-    home = paper.drive_forces(path.motion(np.zeros(1))).mechanism
-    text = robots.three_pprs(paper, home)
-    joints = {}
-    for n in (1, 2, 3):
-        for kind, name in (('revolute', f'hinge_{n}'), ('spherical', f'ball_{n}')):
-            joints[name] = {key: float(values[f'friction.{kind}.{key}'])
-                            for key in ('viscous', 'coulomb')}
-            joints[name]['radius'] = float(values[f'friction.{kind}.diameter']) / 2
-    for d, name in enumerate(paper.drives if drives else ()):
-        joints[name] = {key: float(values[f'friction.drives.{key}'][d])
-                        for key in ('viscous', 'coulomb')}
-    model = DriveModel.load(text.write(tmp_path, {
-        'joints': joints, 'reversal_rate': float(values['friction.reversal_rate']),
-        'reversal_velocity': float(values['friction.reversal_velocity'])}))
-    return paper, model
+    paper = DriveModel.from_parameters({
+        **DriveModel.load().values, 'masses.inertia': (0.005, 0.006, 0.01, 0.0, 0.0, 0.0)})
+    robot, friction = paper.robot, paper.friction
+    blocks = {drive: {'viscous': c, 'coulomb': mu} for drive, c, mu in zip(
+        paper.drives, friction.viscous, friction.coefficient, strict=True)}
+    of_joints = next(e.blocks for e in paper.effects if isinstance(e, ModelJointFriction))
+    for place in robot.passive_joints:
+        blocks |= dict.fromkeys(place.joints, of_joints[place.name])
+    tree = Mechanism(robot.structure, robot.bodies, robot.inertial, robot.armature, robot.gravity,
+                     {name: block.get('radius', 0.0) for name, block in blocks.items()})
+    return paper, replace(paper, robot=tree, effects=(
+        DriveFriction(0.0, 0.0), ModelJointFriction(blocks)))
 
 
-def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path: Path) -> None:
+def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states() -> None:
     """Rigid body, friction of the drives with the load of their guides, and of passive joints."""
-    paper, model = three_pprs(tmp_path, drives=True)
+    paper, model = three_pprs()
     forces = paper.drive_forces(random_motion(np.random.default_rng(8), 1000))
     s = forces.mechanism
     found = model.drive_forces(JointMotion(s.position, s.velocity, s.acceleration)).parts
@@ -141,7 +139,7 @@ def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path
 
 
 HINGES, BALLS = ([f'{kind}_{n}' for n in (1, 2, 3)] for kind in ('hinge', 'ball'))
-# Effects of the closed form, and the same of the tree with loops: u_i is a hinge's angle + pi / 2.
+# Effects of the closed form, and the same of the tree with loops.
 OF_BOTH = {
     'base_tilt': ({'x': 0.05, 'y': -0.03},) * 2,
     'joint_friction': (
@@ -154,25 +152,26 @@ OF_BOTH = {
     'joint_spring': (
         {'revolute.stiffness': 0.8, 'revolute.position': 1.3},
         {f'{hinge}.{key}': value for hinge in HINGES for key, value in (
-            ('stiffness', 0.8), ('position', 1.3 - np.pi / 2))}),
+            ('stiffness', 0.8), ('position', 1.3))}),
     'payload_mass': ({'mass': 0.4},) * 2,
+    'payload_offset': ({'x': 0.02, 'y': -0.03, 'z': 0.05},) * 2,
+    'platform_inertia': ({'xx': 0.004, 'yy': 0.005, 'zz': 0.006, 'xy': 0.001},) * 2,
     'external_wrench': ({'force_x': 15.0, 'force_y': -25.0, 'force_z': 50.0, 'moment_x': 0.4,
                          'moment_y': -0.9, 'moment_z': 0.6},) * 2,
     'tool_drag': ({'coefficient': 7.0, 'rotational': 0.05},) * 2}
 
 
 @pytest.mark.parametrize('name', OF_BOTH)
-def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> None:
+def test_an_effect_is_the_same_in_both_kernels(name: str) -> None:
     """Its own force, and what loads that it adds bring of friction in joints and guides."""
-    paper, model = three_pprs(tmp_path, drives=True)
-    motion = random_motion(np.random.default_rng(4), 100)
-    parts = []
-    for robot, values in zip((paper, model), OF_BOTH[name], strict=True):
-        changed = with_effects(robot, {name: values})
-        s = paper.drive_forces(motion).mechanism
-        parts.append(changed.drive_forces(motion if robot is paper else JointMotion(
-            s.position, s.velocity, s.acceleration)).parts)
-    closed, tree = parts
+    motion, found = random_motion(np.random.default_rng(4), 100), []
+    for model, values in zip(three_pprs(), OF_BOTH[name], strict=True):
+        effect = CATALOGUE[name].bound(model.robot).from_file(values)
+        changed = replace(model, effects=(*model.effects, effect))
+        if found:
+            motion = JointMotion(*found[0].drive_motion)
+        found.append(changed.drive_forces(motion))
+    closed, tree = (forces.parts for forces in found)
     assert np.abs(closed[name]).max() > 0.05
     assert tree[name] == pytest.approx(closed[name], abs=1e-9)
     assert tree['passive_friction'] == pytest.approx(
@@ -437,9 +436,7 @@ def parallelogram(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
 
 
 def test_links_that_turn_alike_are_grouped_and_no_others(parallelogram: DriveModel) -> None:
-    robot = parallelogram.robot
-    names = [tuple(robot.body_names[k] for k in group) for group in alike_bodies(robot)]
-    assert names == [('crank', 'follower'), ('coupler',), ('pointer',)]
+    assert parallelogram.robot.alike_links == (('crank', 'follower'), ('coupler',), ('pointer',))
 
 
 def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: DriveModel) -> None:

@@ -33,7 +33,6 @@ from pprs_dynamics.simulation.injection import (
     named,
     simulate_mechanism,
 )
-from pprs_dynamics.simulation.platform import as_mechanism
 
 
 @pytest.fixture(scope='module')
@@ -173,7 +172,7 @@ def plain_platform(model: DriveModel = PLATFORM, start: float = 0.0, rounds: int
     """Return a platform along 3 s of a path without hidden effects, and that motion."""
     motion = Excitation(seed=3).motion(start + np.arange(300) / 100)
     state = model.mechanism(motion)
-    return PlainRobot(as_mechanism(model), JointMotion(
+    return PlainRobot(model, JointMotion(
         state.position, state.velocity, state.acceleration, motion.time), rounds=rounds), motion
 
 
@@ -190,7 +189,7 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
     model = DriveModel.load(f'config/{file}.yaml')
     if model.moves_joints:
         motion: Any = draw_motion(model, 6.0, 3)
-        plain = PlainRobot(as_mechanism(model), motion, rounds=4)
+        plain = PlainRobot(model, motion, rounds=4)
     else:
         plain, motion = plain_platform(model, 6.0, rounds=4)
     run = Injection(plain, [named(name, np.random.default_rng(1), 1.0)], np.random.default_rng(2))

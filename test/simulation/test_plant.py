@@ -16,7 +16,7 @@ import pytest
 import robots_with_loops as robots
 
 import pprs_dynamics
-from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.simulation.drive_control import (
     LONGEST_LATE,
@@ -27,7 +27,6 @@ from pprs_dynamics.simulation.drive_control import (
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injection import draw_motion
 from pprs_dynamics.simulation.plant import Plant
-from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.simulated_robot import Measurement, SensorSettings, SimulatedRobot
 
 QUIET = SensorSettings(effort_noise=0.0)
@@ -36,7 +35,7 @@ TICK = 0.002
 
 def models(tmp_path: Path) -> dict[str, DriveModel]:
     """Return the example robots with friction in every joint, and an arm."""
-    return {'platform': as_mechanism(DriveModel.load('config/paper.yaml')),
+    return {'platform': DriveModel.load('config/paper.yaml'),
             'hexapod': DriveModel.load('config/hexapod.yaml'),
             'delta': DriveModel.load('config/delta.yaml'),
             'arm': DriveModel.load(made_up_arm.write_arm(tmp_path, **{
@@ -57,7 +56,7 @@ def test_the_model_needs_the_efforts_under_which_the_plant_accelerates(
     # Loads of friction are those of the acceleration before: they settle.
     for _ in range(5):
         plant.last_acceleration = plant.acceleration(q, v, effort, v, 0.0)
-    needed = model.drive_forces(JointMotion(
+    needed = model.drive_forces(model.robot.motion_of_drives(
         q[None], v[None], plant.last_acceleration[None])).total[0]
     assert needed == pytest.approx(effort, abs=1e-5 * plant.largest.max())
 
@@ -68,7 +67,8 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
 ) -> None:
     model = models(tmp_path)[name]
     motion = draw_motion(model, 8.0, 1, 1 / TICK)[:500]
-    forces = model.drive_forces(motion).total
+    forces = model.drive_forces(model.robot.motion_of_drives(
+        motion.position, motion.velocity, motion.acceleration)).total
     plant = Plant(model)
     robot = SimulatedRobot(plant, rate=1 / TICK, control=plant.gains(7.0, 0.9), sensors=QUIET)
     points = [Setpoint(*values) for values in zip(motion.position, motion.velocity, forces,

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.mechanism import evaluation
+from pprs_dynamics.physics.mechanism.description import about_centre
 from pprs_dynamics.physics.three_pprs.robot import ClosedForm, Geometry, Masses, ThreePprs
 
 ELBOWS = ('up', 'down')
@@ -40,7 +41,7 @@ def random_robot(
     geometry = Geometry(
         0.15 * rng.uniform(0.9, 1.1), 0.10 * rng.uniform(0.9, 1.1), 0.30 * rng.uniform(0.95, 1.1),
         tuple(third + rng.uniform(-0.1, 0.1, 3)), tuple(third + rng.uniform(-0.1, 0.1, 3)), elbow)
-    return ThreePprs(geometry, random_masses(rng), tuple(np.asarray(gravity, dtype=float)))
+    return ThreePprs.of(geometry, random_masses(rng), tuple(np.asarray(gravity, dtype=float)))
 
 
 def random_masses(rng: np.random.Generator) -> Masses:
@@ -58,7 +59,15 @@ def random_masses(rng: np.random.Generator) -> Masses:
 
 def inverse_kinematics(geometry: Geometry, motion: PlatformMotion) -> ClosedForm:
     """Return the motion of chains and drives that belongs to a platform motion."""
-    return ClosedForm(ThreePprs(geometry, random_masses(np.random.default_rng(0))), motion)
+    return ClosedForm(ThreePprs.of(geometry, random_masses(np.random.default_rng(0))), motion)
+
+
+def masses_of(robot: ThreePprs) -> Masses:
+    """Return the masses of a robot, those of its payload with those of the platform."""
+    mass, centre, I = about_centre(robot.inertial[-1])  # noqa: E741
+    slides, lifts, rods = robot.masses[:-1].reshape(3, 3).tolist()
+    return Masses(mass, 0.0, tuple(slides), tuple(lifts), tuple(rods), tuple(centre.tolist()),
+                  tuple(map(float, (*np.diag(I), I[0, 1], I[0, 2], I[1, 2]))))
 
 
 def paper_geometry(elbow: str = 'up') -> Geometry:
@@ -110,8 +119,7 @@ def smooth_motion(t: Any, elbow: str = 'up') -> PlatformMotion:
 def robot_keys(robot: ThreePprs) -> dict[str, Any]:
     """Return the keys of a model file that describe `robot`."""
     keys: dict[str, Any] = {'gravity': robot.gravity}
-    for group in ('geometry', 'masses'):
-        part = getattr(robot, group)
+    for group, part in (('geometry', robot.geometry), ('masses', masses_of(robot))):
         keys.update({f'{group}.{field.name}': getattr(part, field.name) for field in fields(part)})
     return keys
 

@@ -127,37 +127,3 @@ def five_bar() -> RobotText:
         robot.home[f'{side}_elbow'] = round(float(rod - bend), 3)
     robot.loop('tip', 'revolute', 'left_rod', (outer, 0, 0), 'right_rod', (outer, 0, 0))
     return robot
-
-
-def three_pprs(model: Any, home: Any) -> RobotText:
-    """Return a 3-PPRS of a `DriveModel` as a tree with loops; `home` is its state at one pose."""
-    geometry, masses = model.robot.geometry, model.robot.masses
-    robot = RobotText('three_pprs')
-    robot.link('base')
-    xx, yy, zz, *products = masses.inertia
-    assert not any(products)
-    robot.link('platform', masses.platform + masses.payload, masses.centre, (xx, yy, zz))
-    robot.joint('free', 'floating', 'base', 'platform')
-    robot.home['platform_pose'] = [*map(float, home.motion.position[0]),
-                                   *map(float, home.motion.orientation[0])]
-    length = geometry.rod_length
-    for i, angle in enumerate(geometry.chain_angles):
-        n = i + 1
-        foot = geometry.base_radius * np.array([np.cos(angle), np.sin(angle), 0.0])
-        along = np.array([-np.sin(angle), np.cos(angle), 0.0])
-        on = geometry.platform_angles[i]
-        ball = geometry.platform_radius * np.array([np.cos(on), np.sin(on), 0.0])
-        robot.link(f'slider_{n}', masses.slides[i])
-        robot.link(f'carriage_{n}', masses.lifts[i])
-        across = masses.rods[i] * length ** 2 / 12
-        robot.link(f'rod_{n}', masses.rods[i], (0, 0, length / 2), (across, across, 0.0))
-        robot.joint(f'slide_{n}', 'prismatic', 'base', f'slider_{n}', foot, along)
-        robot.joint(f'lift_{n}', 'prismatic', f'slider_{n}', f'carriage_{n}')
-        robot.joint(f'hinge_{n}', 'continuous', f'carriage_{n}', f'rod_{n}', axis=along)
-        robot.loop(f'ball_{n}', 'spherical', f'rod_{n}', (0, 0, length), 'platform', ball)
-        chains = home.links
-        robot.home[f'hinge_{n}'] = float(np.arctan2(-chains.cos_u[0, i], chains.sin_u[0, i]))
-        for kind, at in (('slide', i), ('lift', 3 + i)):
-            robot.home[f'{kind}_{n}'] = float(home.position[0, at])
-    robot.drives = [f'{kind}_{n}' for kind in ('slide', 'lift') for n in (1, 2, 3)]
-    return robot

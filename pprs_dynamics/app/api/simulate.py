@@ -133,16 +133,15 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         For an unknown effect, a motion beyond the strokes, or a model that cannot be simulated.
     """
     from pprs_dynamics.simulation.injection import draw_motion, simulate_mechanism
-    from pprs_dynamics.simulation.platform import as_mechanism
 
     found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     stage(progress, 'preparing the simulation (the first run compiles)')(0.0)
-    share_done, robot = stage(progress, 'simulating'), as_mechanism(found)
+    share_done = stage(progress, 'simulating')
     # With one seed the effects are the same on every path.
     drives = nominal = None
     if found.moves_joints:
-        nominal = draw_motion(robot, duration, 0) if path_seed else None
+        nominal = draw_motion(found, duration, 0) if path_seed else None
     else:
         if path_seed or motion is not None:
             nominal = _of_drives(found, sampled(Excitation(duration=duration), RATE))
@@ -150,7 +149,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
             motion = sampled(Excitation(duration=duration, seed=path_seed), RATE)
         drives = _of_drives(found, motion)
     run = simulate_mechanism(
-        robot, names, seed, noise=noise, duration=duration, path_seed=path_seed,
+        found, names, seed, noise=noise, duration=duration, path_seed=path_seed,
         progress=share_done, motion=drives, nominal=nominal)
     time = run.motion.time
     assert time is not None

@@ -202,7 +202,7 @@ def _root(columns: Array, followed: NDArray[np.bool_], effort: Array) -> Array:
 def _balance(model: DriveModel, position: Array) -> Array:
     """Return the weights of bodies on each drive, (D,), over their sum; at least 1."""
     robot = model.robot
-    if robot.structure is None or not len(position):
+    if not model.moves_joints or not len(position):
         return np.ones(len(model.drives))
     some = position[::max(1, len(position) // table.LEAST_MEANS)]
     try:

@@ -175,7 +175,7 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
-        is_closed_form = self.model.robot.structure is None
+        is_closed_form = not self.model.moves_joints
         slow = samples = Samples.of(
             state, treat, [effect for effect in self.model.effects
                            if isinstance(effect, MeasurementEffect)],
@@ -344,7 +344,7 @@ class Sensitivities:
         present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
-            if self.is_planned and self.model.robot.structure is not None:
+            if self.is_planned and self.model.moves_joints:
                 return self._of_rigid_bodies(effect, state)
         if effect not in self._steps:
             values = {} if present is None else effect.to_coefficients(present.values)

@@ -268,6 +268,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         Whether a single drive feels it as it feels another effect, always.
     acts_in : set of {'platform', 'slide', 'mechanism'}
         The kinds of robots on which it can act: a 3-PPRS, one slide alone, every other one.
+    is_in_payload : bool
+        Whether a payload with a centre and an inertia of its own has its parameters.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -318,6 +320,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     card: ClassVar[Card]
     needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
+    is_in_payload: ClassVar[bool] = False
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
     parameters: ClassVar[tuple[Parameter, ...]]

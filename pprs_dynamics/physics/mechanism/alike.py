@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure
 
 SAMPLES = 40  # random states: several times as many rows as a body has parameters
@@ -36,32 +34,10 @@ KEPT = 16  # of mechanisms: a model is built many times with other numbers
 SAME = 1e-7  # of a column's size that may lie outside the other's space: rounding
 
 
-def alike_links(robot: Any) -> tuple[tuple[str, ...], ...]:
-    """Return groups of links on which an added body does the same, that of the tool first."""
-    if robot.structure is None:
-        return ()
-    names = robot.body_names
-    return tuple(tuple(names[k] for k in sorted(group, key=lambda k: k != robot.carrier))
-                 for group in alike_bodies(robot))
-
-
-def alike_joints(robot: Any) -> tuple[tuple[str, ...], ...]:
-    """Return groups of joints that do the same, a drive first."""
-    if robot.structure is None:
-        return ()
-    return tuple(tuple(sorted(group, key=lambda name: name not in robot.structure.drives))
-                 for group in proportional_joints(robot.structure) if len(group) > 1)
-
-
-def alike_bodies(robot: Mechanism) -> tuple[tuple[int, ...], ...]:
-    """Return groups of bodies, by number, on which an added body does the same."""
-    return _alike_bodies(robot.structure, tuple(robot.bodies.tolist()), tuple(robot.gravity))
-
-
 @lru_cache(KEPT)
-def _alike_bodies(structure: Structure, bodies: tuple[int, ...],
-                  gravity: tuple[float, float, float]) -> tuple[tuple[int, ...], ...]:
-    """Return groups of bodies by number, for any masses."""
+def alike_bodies(structure: Structure, bodies: tuple[int, ...],
+                 gravity: tuple[float, float, float]) -> tuple[tuple[int, ...], ...]:
+    """Return groups of bodies, by number, on which an added body does the same."""
     count = len(bodies)
     if count < 2:
         return tuple((k,) for k in range(count))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 
@@ -224,23 +225,31 @@ def from_pseudo_inertia(P: Array) -> Array:
                      trace - P[1, 1], -P[0, 2], -P[1, 2], trace - P[2, 2]])
 
 
-def principal_inertia(parameters: Array) -> tuple[float, Array, Array, Array]:
-    """Return mass, centre, principal moments about it and their axes as columns, of a body (10,).
+def about_centre(parameters: Array) -> tuple[float, Array, Array]:
+    """Return mass, centre and inertia about it, (3, 3), of a body (10,).
 
-    The axes are right-handed. A body without mass, as of a rotor that only turns, has its centre at
-    the origin.
+    A body without mass, as of a rotor that only turns, has its centre at the origin.
     """
     mass = float(parameters[0])
     centre = parameters[1:4] / mass if mass else np.zeros(3)
     xx, xy, yy, xz, yz, zz = parameters[4:]
     about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
              - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
+    return mass, centre, about
+
+
+def principal_inertia(parameters: Array) -> tuple[float, Array, Array, Array]:
+    """Return mass, centre, principal moments about it and their axes as columns, of a body (10,).
+
+    The axes are right-handed.
+    """
+    mass, centre, about = about_centre(parameters)
     moments, axes = np.linalg.eigh(about)
     axes[:, 0] *= np.linalg.det(axes)
     return mass, centre, moments, axes
 
 
-def body_at(mass: float, centre: tuple[float, ...], inertia: Array) -> Array:
+def body_at(mass: float, centre: ArrayLike, inertia: Array) -> Array:
     """Return the parameters (10,) of a body with an inertia (3, 3) about its centre of mass."""
     c = np.array(centre, dtype=float)
     about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))

@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
     PRISMATIC,
@@ -33,19 +34,20 @@ from pprs_dynamics.physics.mechanism.state import (
     SLIDE,
     BodyPlace,
     MechanismState,
-    Motion,
     PassiveJoint,
     Reversal,
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
+    EFFORTS,
+    FORCES,
+    MOTION,
     NO_FRICTION,
     RIGID,
     WORST_CONDITION,
     InverseDynamicsResult,
     JointFriction,
-    Loads,
 )
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
@@ -141,6 +143,20 @@ class Mechanism:
                 found.append(BodyPlace(name, (x, y, z), float(self.masses[k]), links=(name,)))
         return tuple(found)
 
+    @property
+    def alike_links(self) -> tuple[tuple[str, ...], ...]:
+        """Groups of links on which an added body does the same, that of the tool first."""
+        names = self.body_names
+        return tuple(tuple(names[k] for k in sorted(group, key=lambda k: k != self.carrier))
+                     for group in alike_bodies(self.structure, tuple(self.bodies.tolist()),
+                                               tuple(self.gravity)))
+
+    @property
+    def alike_joints(self) -> tuple[tuple[str, ...], ...]:
+        """Groups of joints that do the same, a drive first."""
+        return tuple(tuple(sorted(group, key=lambda name: name not in self.drives))
+                     for group in proportional_joints(self.structure) if len(group) > 1)
+
     def centre_of(self, link: str) -> Array:
         """Return the centre of mass of a body in the frame of one of its links, (3,) [m]."""
         row, frame = self.structure.links[link]
@@ -152,18 +168,24 @@ class Mechanism:
         return float(self.masses.sum())
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       is_own: bool = False) -> JointFriction:
-        """Return friction of joints as `MechanismState.friction_efforts` takes it.
+                       is_own: bool = False) -> Any:
+        """Return friction of joints as `MechanismState.friction_efforts` takes it."""
+        return self.tree_friction(blocks, reversal)
+
+    def tree_friction(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                      ) -> JointFriction:
+        """Return friction of joints of the tree.
 
         Parameters
         ----------
         blocks : mapping of str to mapping
-            `viscous`, `torque`, `coulomb` and `radius` by joint; 0 where one is left out, but the
-            radius of a slide, which is 1.
+            `viscous`, `torque`, `coulomb` and `radius` by joint, or by the name of several; 0
+            where one is left out, but the radius of a slide, which is 1.
         reversal : Reversal
             In drives by their velocity, in all others by their rate, or that of slides.
         """
-        structure = self.structure
+        structure, of = self.structure, {joint.name: joint.joints for joint in self.passive_joints}
+        blocks = {joint: block for name, block in blocks.items() for joint in of.get(name, (name,))}
         widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
                           strict=True))
         rows = structure.friction_rows
@@ -179,7 +201,7 @@ class Mechanism:
                              np.array([widths.get(name, reversal.slide if slide else reversal.rate)
                                        for name, slide in zip(blocks, slides, strict=True)]))
 
-    def with_body(self, link: str, parameters: Array) -> Mechanism:
+    def with_body(self, link: str, parameters: Array) -> Self:
         """Return the mechanism with a body more on a link.
 
         Parameters
@@ -212,7 +234,8 @@ class Mechanism:
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D) [N m, N]."""
-        efforts: Array = self.loads(self.at(position, velocity, acceleration), None).efforts
+        efforts: Array = self.at(position, velocity, acceleration).loads(
+            self.by_joint, self.gravity_row).efforts
         return efforts
 
     def regressor(self, position: Array, velocity: Array, acceleration: Array) -> Array:
@@ -260,18 +283,18 @@ class Mechanism:
         return ToolPose(self.structure)
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         closed: dict[Any, Array] | None = None) -> JointMotion:
+                         closed: dict[Any, Array] | None = None) -> Any:
         """Return the motion of the drives; loops are closed where forces are evaluated."""
         return JointMotion(position, velocity, acceleration)
 
-    def at_home(self, samples: int) -> JointMotion:
+    def at_home(self, samples: int) -> Any:
         """Return the drives at rest where the description has them, one sample a second."""
         position = np.tile(self.structure.home[self.structure.tables.drives], (samples, 1))
         still = np.zeros_like(position)
         return JointMotion(position, still, still, np.arange(samples, dtype=float))
 
-    def state(self, motion: Motion, reversal: Reversal,
-              friction: JointFriction = NO_FRICTION, closed: dict[Any, Array] | None = None,
+    def state(self, motion: Any, reversal: Reversal, friction: Any = NO_FRICTION,
+              closed: dict[Any, Array] | None = None,
               found: InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
         closed = {} if closed is None else closed
@@ -292,31 +315,36 @@ class Mechanism:
         if len(state) and self.structure.loops:
             closed[self.structure] = state.closed[-1].copy()
 
-    def kinematics(self, state: MechanismState) -> LinkMotion:
+    def tree_motion(self, state: MechanismState) -> LinkMotion:
+        """Return the motion of the links of the tree in a state."""
+        links: LinkMotion = state.links
+        return links
+
+    def kinematics(self, state: MechanismState) -> Any:
         """Return the motion of all links in a state."""
         found = vars(state).get('inverse_dynamics')
         start, nearby = (state.start, state.nearby) if found is None else (found.q, None)
         return LinkMotion.of(self.structure, state.position, state.velocity, state.acceleration,
                              start, nearby)
 
-    def loads(self, links: LinkMotion, load: StructureLoad | None) -> Loads:
+    def loads(self, links: Any, load: StructureLoad | None) -> Any:
         """Return the frictionless loads of joints and closures."""
         return links.loads(self.by_joint, self.gravity_row, load)
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
         """Return closed coordinates, efforts and own friction in one pass."""
-        return self.structure.evaluation.inverse_dynamics(
-            (state.position, state.velocity, state.acceleration), self.by_joint, self.gravity_row,
-            state.friction, None, state.start, state.nearby)
+        nearby = {} if state.nearby is None else {self.structure: state.nearby}
+        return self.one_pass(state, self.friction_parameters(state.friction), nearby,
+                             start=state.start)
 
-    def friction_parameters(self, joints: JointFriction, drives: Array,
-                            ) -> tuple[JointFriction, Array]:
-        """Return friction of joints and numbers of drives, (OF_DRIVE, D), for `one_pass`."""
-        return joints, drives
+    def friction_parameters(self, joints: Any, drives: Array | None = None) -> Any:
+        """Return friction of joints, and of drives (OF_DRIVE, D) or none, for `one_pass`."""
+        return np.array(joints), self.structure.evaluation.no_actuators if (
+            drives is None) else drives
 
-    def one_pass(self, motion: Motion,
-                 parameters: tuple[JointFriction, Array], closed: dict[Any, Array] | None,
-                 has_state: bool = False) -> InverseDynamicsResult | None:
+    def one_pass(self, motion: Any, parameters: Any, closed: dict[Any, Array] | None,
+                 has_state: bool = False, start: Array | None = None,
+                 ) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
@@ -330,24 +358,31 @@ class Mechanism:
             See `ModelState`.
         has_state : bool
             Whether the state for the motion is made next from the result.
+        start : (N, C) array, optional
+            See `Evaluation.forward_kinematics`.
         """
         if not isinstance(motion, JointMotion):
             return None
-        structure, (joints, drives) = self.structure, parameters
-        found = structure.evaluation.inverse_dynamics(
-            (motion.position, motion.velocity, motion.acceleration), self.by_joint,
-            self.gravity_row, joints, drives,
-            nearby=None if closed is None else closed.get(structure))
-        if found is not None and closed is not None and structure.loops and len(motion):
-            closed[structure] = found.q[-1].copy()
-        return found
+        structure, moved = self.structure, (motion.position, motion.velocity, motion.acceleration)
+        given = np.array(moved)
+        q, efforts = np.empty((len(motion), len(structure.home))), np.empty(
+            (EFFORTS, *given.shape[1:]))
+        failed = structure.evaluation.run(
+            MOTION | FORCES, None, given, start, None if closed is None else closed.get(structure),
+            (self.by_joint, self.gravity_row), None, (*parameters, q, efforts))
+        if failed >= 0:
+            return None
+        if closed is not None and structure.loops and len(motion):
+            closed[structure] = q[-1].copy()
+        return InverseDynamicsResult(q, efforts, moved)
 
     def friction_load(self, state: MechanismState) -> Array:
         """Return the loads of the drives' gears [N m, N], (N, D)."""
         return np.abs(state.transmitted)
 
-    def load_of_friction(self, state: MechanismState, joints: JointFriction) -> None:
+    def load_of_friction(self, state: MechanismState, joints: Any) -> StructureLoad | None:
         """Return None: what friction of passive joints adds to the loads is neglected."""
+        return None
 
     def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
                   ) -> MechanismState:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     TRANSMITTED,
     InverseDynamicsResult,
 )
+
+if TYPE_CHECKING:
+    from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 Motion = JointMotion | PlatformMotion
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
@@ -134,32 +137,6 @@ class StructureLoad(NamedTuple):
             name: torque[samples] for name, torque in self.torques.items()})
 
 
-class Robot(Protocol):
-    """Protocol of what a state asks its robot for; see `Mechanism`."""
-
-    @property
-    def drives(self) -> tuple[str, ...]: ...
-
-    @property
-    def armature(self) -> Array: ...
-
-    def kinematics(self, state: MechanismState) -> Any: ...
-
-    def loads(self, links: Any, load: StructureLoad | None) -> Any: ...
-
-    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None: ...
-
-    def friction_load(self, state: MechanismState) -> Array: ...
-
-    def load_of_friction(self, state: MechanismState, joints: Any) -> StructureLoad | None: ...
-
-    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       is_own: bool = False) -> Any: ...
-
-    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
-                  ) -> MechanismState: ...
-
-
 @dataclass(frozen=True, eq=False)
 class MechanismState(JointMotion):
     """The motion of a robot's drives with the quantities that effects take, (N, D) each.
@@ -168,7 +145,7 @@ class MechanismState(JointMotion):
 
     Parameters
     ----------
-    robot : Mechanism or ThreePprs
+    robot : Mechanism
     reversal : Reversal
     load : StructureLoad, optional
     known : LinkMotion or ClosedForm, optional
@@ -181,7 +158,7 @@ class MechanismState(JointMotion):
         The motion of the tool, where the state was made from it.
     """
 
-    robot: Robot = field(kw_only=True)
+    robot: Mechanism = field(kw_only=True)
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Any = field(default=None, kw_only=True)
@@ -288,7 +265,7 @@ class MechanismState(JointMotion):
         vars(state)['reactions'] = self.reactions
         return state
 
-    def with_load(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
+    def with_load(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
         """Return a state of this motion with other bodies, and with an additional load."""
         if load is None:
             load = self.load

@@ -1028,13 +1028,12 @@ class Evaluation:
         self.tables, self.home, self.packed = t, home, packed_tables(t)
         self.sizes = self.packed.sizes
         self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
-        self._friction = NO_FRICTION, np.array(NO_FRICTION)
         # Of stages that take no motion or no bodies, or give no efforts.
         drives = len(t.drives)
         self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
         self._no_bodies = np.zeros((len(t.joints), PARAMETERS))
-        self._no_actuators = np.zeros((OF_DRIVE, drives))
-        self._no_actuators[WIDTH] = 1.0
+        self.no_actuators = np.zeros((OF_DRIVE, drives))
+        self.no_actuators[WIDTH] = 1.0  # without rotors and friction
 
     @cached_property
     def at_home(self) -> Array:
@@ -1070,7 +1069,7 @@ class Evaluation:
             The first sample at which the loops do not close, or -1.
         """
         rows = np.zeros((len(q), self._lengths[0]))
-        return rows, self._run(MOTION | KEPT, rows, np.array((q, v, a)), start, nearby)
+        return rows, self.run(MOTION | KEPT, rows, np.array((q, v, a)), start, nearby)
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
                wrenches: Mapping[int, tuple[Array, Array]]) -> Loads:
@@ -1090,7 +1089,7 @@ class Evaluation:
         for joint, (force, moment) in wrenches.items():
             o.f[:, joint] += force
             o.n[:, joint] += moment
-        self._run(FORCES | KEPT, rows, bodies=(inertial, gravity, loads))
+        self.run(FORCES | KEPT, rows, bodies=(inertial, gravity), loads=loads)
         return o
 
     def joint_friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
@@ -1109,52 +1108,37 @@ class Evaluation:
             np.empty(len(self.home)), found)
         return found
 
-    def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
-                         gravity: Array, friction: JointFriction,
-                         actuators: Array | None = None, start: Array | None = None,
-                         nearby: Array | None = None) -> InverseDynamicsResult | None:
-        """Return the efforts for a motion of the drives, in one pass that stores nothing else.
+    def run(self, stages: int, rows: Array | None = None, given: Array | None = None,
+            start: Array | None = None, nearby: Array | None = None,
+            bodies: tuple[Array, Array] | None = None, loads: Array | None = None,
+            results: tuple[Array, Array, Array, Array] | None = None) -> int:
+        """Evaluate stages, and return the first sample that fails or -1.
 
         Parameters
         ----------
-        motion : three (N, D) arrays
+        stages : int
+            Of MOTION, FORCES and KEPT.
+        rows, loads : (N, K) arrays, optional
+            Where stages are kept.
+        given : (3, N, D) array, optional
             Position, velocity and acceleration of the drives.
-        inertial : (J + 1, 10) array
-        gravity : (3,) array
-        friction : JointFriction
-        actuators : (OF_DRIVE, D) array, optional
-            See `actuator_efforts`; without it the drives have no rotor and no friction.
         start, nearby : (N, C) and (C,) arrays, optional
             See `forward_kinematics`.
-
-        Returns
-        -------
-        InverseDynamicsResult or None
-            None where a sample is out of reach or singular, which `forward_kinematics` says.
+        bodies : (J + 1, 10) and (3,) arrays, optional
+            Inertial parameters, and gravity.
+        results : tuple of arrays, optional
+            Friction of joints, see `joint_friction`; parameters of drives, see `actuator_efforts`;
+            and what is filled in: closed coordinates (N, C) and efforts (EFFORTS, N, D).
         """
-        given, last = np.array(motion), self._friction
-        if friction is not last[0]:
-            last = self._friction = friction, np.array(friction)
-        samples, drives = given.shape[1:]
-        closed, efforts = np.empty((samples, len(self.home))), np.empty((EFFORTS, samples, drives))
-        failed = self._run(
-            MOTION | FORCES, np.empty((1, self._lengths[0])), given, start, nearby,
-            (inertial, gravity, np.empty((1, self._lengths[1]))),
-            (last[1], self._no_actuators if actuators is None else actuators, closed, efforts))
-        return None if failed >= 0 else InverseDynamicsResult(closed, efforts, motion)
-
-    def _run(self, stages: int, rows: Array, given: Array | None = None,
-             start: Array | None = None, nearby: Array | None = None,
-             bodies: tuple[Array, Array, Array] | None = None,
-             results: tuple[Array, Array, Array, Array] | None = None) -> int:
-        """Evaluate stages, and return the first sample that fails or -1; see `evaluate`."""
         warm = nearby is not None
         first = (nearby if nearby is not None else
                  self.home if start is None or not len(start) else start[0])
+        rows = np.empty((1, self._lengths[0])) if rows is None else rows
         return int(run(
             evaluate, *self.packed, self.home,
             self.at_home if warm or not stages & KEPT else NOWHERE, np.array(first),
             self._no_motion if given is None else given, rows,
-            *(bodies or (self._no_bodies, NO_GRAVITY, np.empty((len(rows), self._lengths[1])))),
-            *(results or (np.array(NO_FRICTION), self._no_actuators,
+            *(bodies or (self._no_bodies, NO_GRAVITY)),
+            np.empty((len(rows), self._lengths[1])) if loads is None else loads,
+            *(results or (np.array(NO_FRICTION), self.no_actuators,
                           np.empty((len(rows), len(self.home))), self._no_efforts)), stages, warm))

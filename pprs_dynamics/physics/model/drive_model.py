@@ -6,7 +6,7 @@
     tau = rigid body + own friction + effects
 
 per drive, positive along its positive direction; Eq. (14). What differs from robot to robot
-belongs to the robot: `ThreePprs` in closed form, `Mechanism` for every other one.
+belongs to the robot, a `Mechanism`; `ThreePprs` is one in closed form.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class DriveModel:
 
     Parameters
     ----------
-    robot : Mechanism or ThreePprs
+    robot : Mechanism
         Bodies and joints; effects take their parameters from it.
     effects : tuple of Effect
         What acts in addition to the rigid body; the model's own friction comes first.
@@ -189,15 +189,14 @@ class DriveModel:
     @property
     def speed_limits(self) -> Array:
         """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
-        structure = self.robot.structure
-        return np.full(len(self.drives), np.inf) if structure is None else structure.speed
+        speed: Array = self.robot.structure.speed
+        return speed
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
-        structure = self.robot.structure
-        return (() if structure is None or self.values.get('links.inertia')
-                else structure.description.faults)
+        faults: tuple[str, ...] = self.robot.structure.description.faults
+        return () if self.values.get('links.inertia') else faults
 
     @property
     def efforts_in_amperes(self) -> bool:
@@ -224,9 +223,10 @@ class DriveModel:
         return next(effect for effect in self.effects if isinstance(effect, DriveFriction))
 
     @property
-    def offset(self) -> DriveOffset:
-        """The constant efforts of its drives."""
-        return next(effect for effect in self.effects if isinstance(effect, DriveOffset))
+    def offset(self) -> Array:
+        """The constant efforts of its drives, (D,) [N m, N]."""
+        return sum((np.asarray(effect.value) for effect in self.effects
+                    if isinstance(effect, DriveOffset)), np.zeros(len(self.drives)))
 
     @property
     def title(self) -> str:
@@ -254,9 +254,8 @@ class DriveModel:
         # A node has no ledger, and an empty list where a file says nothing.
         values = {key: value for key, value in self.values.items()
                   if value not in ([], ()) and not key.startswith('history.')}
-        if self.robot.structure is not None:  # the same wherever the files are
-            content = self.robot.structure.description.digest
-            values.update({key: content for key in FILES if values.get(key)})
+        content = self.robot.structure.description.digest  # the same wherever the files are
+        values.update({key: content for key in FILES if values.get(key)})
         text = json.dumps(values, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -283,9 +282,10 @@ class DriveModel:
         return current
 
     def offers(self, effect: type[CatalogueEffect]) -> bool:
-        """Return whether an effect of the catalogue can act in this robot."""
-        return self.kind in effect.acts_in and (
-            len(self.drives) > 1 or not effect.needs_several_drives)
+        """Return whether an effect of the catalogue can act in this robot, as no other does."""
+        return (self.kind in effect.acts_in and (
+            len(self.drives) > 1 or not effect.needs_several_drives) and (
+            self.robot.tool_place.is_spread or not effect.is_in_payload))
 
     def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
         """Return an effect of the catalogue with the parameters that it has in this model."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import COUNT, DRIVES, DriveUnits
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, DriveOffset
@@ -72,20 +72,20 @@ def read_platform(values: Mapping[str, Any],
     is_independent = values['friction.approach'] == 'independent_chains'
     passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
                else ModelJointFriction(blocks))
-    robot = three_pprs.ThreePprs(
+    lower, upper = zip(*(values[key] for key in STROKES), strict=True)
+    robot = three_pprs.ThreePprs.of(
         Geometry(**below(values, 'geometry.')), Masses(**below(values, 'masses.')),
-        gravity_in_efforts(values, 'gravity'),
-        {name: block['radius'] for name, block in blocks.items()},
-        three_pprs.SingularityBounds(values['limits.rod_sine'], values['limits.condition_number'],
-                                     values['limits.rod_cosine'] if is_independent else 0.0),
-        values['equations'] == 'printed')
+        gravity_in_efforts(values, 'gravity'), (lower, upper, values['limits.effort']),
+        radii={name: block['radius'] for name, block in blocks.items()},
+        bounds=three_pprs.SingularityBounds(
+            values['limits.rod_sine'], values['limits.condition_number'],
+            values['limits.rod_cosine'] if is_independent else 0.0),
+        printed=values['equations'] == 'printed')
     drives = DriveFriction(values['friction.drives.viscous'], 0.0,
                            values['friction.drives.coulomb'])
-    lower, upper = np.array([values[key] for key in STROKES]).T
     return (robot, (drives, passive),
             Reversal(_reversal_widths(values), values['friction.reversal_rate']),
-            DriveLimits(DRIVES, (DriveUnits(),) * COUNT, lower, upper,
-                        np.array(values['limits.effort']), STROKES, 'limits.effort'))
+            _limits(robot.structure, STROKES, 'limits.effort'))
 
 
 def _reversal_widths(values: Mapping[str, Any]) -> tuple[float, ...]:
@@ -103,14 +103,18 @@ def read_mechanism(values: dict[str, Any], folder: Path,
     structure = read_structure(values, folder)
     values.update(described_values(structure, values))
     robot = _with_bodies(structure, values)
-    units = tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds)
     return (robot, (DriveFriction(values['friction.viscous'], values['friction.coulomb']),
                     DriveOffset(values['friction.offset']), *passive_friction(structure, values)),
             Reversal(_reversal_widths(values), values['friction.reversal_rate'],
                      values['friction.reversal_slide']),
-            DriveLimits(structure.drives, units, structure.lower, structure.upper,
-                        structure.effort, ('its range in the URDF',) * len(units),
-                        'the effort limit of URDF or node'))
+            _limits(structure, ('its range in the URDF',) * len(structure.drives),
+                    'the effort limit of URDF or node'))
+
+
+def _limits(structure: Structure, sources: tuple[str, ...], effort_source: str) -> DriveLimits:
+    return DriveLimits(
+        structure.drives, tuple(DriveUnits(kind == REVOLUTE) for kind in structure.kinds),
+        structure.lower, structure.upper, structure.effort, sources, effort_source)
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:

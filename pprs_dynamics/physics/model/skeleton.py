@@ -14,7 +14,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import structure_of
 
 LINK, DRIVE = 'link', 'drive'
 JOINED = 1e-6  # of the robot's size: joints closer than that are one point
@@ -67,11 +66,7 @@ class Skeleton:
     @classmethod
     def of(cls, model: DriveModel, motion: PlatformMotion | JointMotion) -> Skeleton:
         """Return the poses of a motion of a model."""
-        if model.robot.structure is not None:
-            return _of_links(model.mechanism(motion).links)
-        q = model.mechanism(motion).position
-        still = np.zeros_like(q)
-        return _of_links(LinkMotion.of(structure_of(model.robot.geometry), q, still, still))
+        return _of_links(model.robot.tree_motion(model.mechanism(motion)))
 
 
 def _of_links(links: LinkMotion) -> Skeleton:

@@ -5,16 +5,14 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
@@ -29,6 +27,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Frame,
     Joint,
     Loop,
+    about_centre,
     body_at,
 )
 from pprs_dynamics.physics.mechanism.evaluation import row_of, run
@@ -51,6 +50,8 @@ from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Jo
 HOME_HEIGHT = 0.5  # [m], of the platform at home
 SPHERICAL = 'spherical'  # the joints A_i; C_i are REVOLUTE
 HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
+LINKS = (*DRIVES, *RODS, PLATFORM)  # that move, in the order of `ThreePprs.inertial`
+OF_RODS = np.s_[6:9]  # in `LINKS`
 ALIKE = {REVOLUTE: HINGES, SPHERICAL: BALLS}  # of the tree
 POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
@@ -152,35 +153,27 @@ def _require(key: str, value: Any, condition: bool, rule: str) -> None:
         raise ModelError(key, value, rule)
 
 
-UNLOADED = Masses(1.0, 0.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 6)
+Limits = tuple[tuple[float, ...], ...]
+UNLIMITED: Limits = ((-inf,) * COUNT, (inf,) * COUNT, (inf,) * COUNT)
 
 
 @lru_cache
-def structure_of(geometry: Geometry) -> Structure:
+def structure_of(geometry: Geometry, limits: Limits = UNLIMITED) -> Structure:
     """Return the joints and closures of a 3-PPRS, whose platform is a free body.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    limits : three tuples of 6 floats
+        Lowest and highest position of each drive [m], and its largest force [N].
 
     Raises
     ------
     ModelError
         Where the drives do not determine the platform's motion at home.
     """
-    return tree_structure(geometry, UNLOADED, (np.full(6, -np.inf), *np.full((2, 6), np.inf)))
-
-
-def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Array, Array],
-                   ) -> Structure:
-    """Return the joints, closures and bodies of a 3-PPRS, whose platform is a free body.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    masses : Masses
-    limits : tuple of three (6,) arrays
-        Lowest and highest position of each drive [m], and its largest force [N].
-    """
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
-    platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
-    links = {'base': np.zeros(PARAMETERS)}
+    links = {name: np.zeros(PARAMETERS) for name in ('base', *LINKS)}
     joints: dict[str, Joint] = {}
     loops: list[Loop] = []
     home: dict[str, float] = {}
@@ -193,11 +186,6 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
     for i in range(3):
         delta, beta = geometry.chain_angles[i], geometry.platform_angles[i]
         n = i + 1
-        mass = masses.rods[i]
-        across = mass * l ** 2 / 12
-        links[f'slide_{n}'] = body_at(masses.slides[i], (0.0,) * 3, np.zeros((3, 3)))
-        links[f'lift_{n}'] = body_at(masses.lifts[i], (0.0,) * 3, np.zeros((3, 3)))
-        links[f'rod_{n}'] = body_at(mass, (-l / 2, 0.0, 0.0), np.diag([0.0, across, across]))
         foot = Frame.of((R * math.cos(delta), R * math.sin(delta), 0.0), (0.0, 0.0, delta))
         hang(f'slide_{n}', PRISMATIC, 'base', f'slide_{n}', foot, e_y)
         hang(f'lift_{n}', PRISMATIC, f'slide_{n}', f'lift_{n}', Frame(), e_z)
@@ -208,15 +196,19 @@ def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Arra
                  f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
         end = Frame(p=np.array([r * math.cos(beta), r * math.sin(beta), 0.0]))
         loops.append(Loop(f'ball_{n}', 'spherical', f'rod_{n}', Frame(p=np.array([-l, 0.0, 0.0])),
-                          'platform', end))
-    links['platform'] = platform
-    hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
-    poses = {'platform': Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
+                          PLATFORM, end))
+    hang(PLATFORM, FLOATING, 'base', PLATFORM, Frame(), e_x)
+    poses = {PLATFORM: Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
     for drive, lower, upper, effort in zip(DRIVES, *limits, strict=True):
-        joints[drive] = replace(joints[drive], lower=float(lower), upper=float(upper),
-                                effort=float(effort))
-    description = Description('', links, joints, '')
-    return build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
+        joints[drive] = replace(joints[drive], lower=lower, upper=upper, effort=effort)
+    return build_structure(Description('', links, joints, ''), 'base', PLATFORM, DRIVES,
+                           tuple(loops), home, poses)
+
+
+def rod(length: float, mass: float) -> Array:
+    """Return the inertial parameters of a rod in its frame, (10,)."""
+    across = mass * length ** 2 / 12
+    return body_at(mass, (-length / 2, 0.0, 0.0), np.diag([0.0, across, across]))
 
 
 class SingularityBounds(NamedTuple):
@@ -367,13 +359,45 @@ def condition_number(geometry: Geometry, J: Array) -> Array:
     return number
 
 
-class Alike:
-    """Places of a 3-PPRS and of its tree: joints and links are three of a kind."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ThreePprs(Mechanism):
+    """The 3-PPRS: a mechanism that the paper's closed form evaluates.
 
-    radii: Mapping[str, float]
-    tool_place = BodyPlace('platform', (0.0, 0.0, 0.0), inf, is_spread=True)
-    link_places: tuple[BodyPlace, ...] = (
+    Parameters
+    ----------
+    geometry : Geometry
+    bounds : SingularityBounds
+    printed : bool
+        Take Eq. (7) to the letter.
+    """
+
+    geometry: Geometry
+    bounds: SingularityBounds = UNBOUNDED
+    printed: bool = False
+
+    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
+    kind: ClassVar[str] = PLATFORM
+    # Joints and links are three of a kind; no two kinds are alike.
+    alike_joints: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    alike_links: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    tool_place: ClassVar[BodyPlace] = BodyPlace(PLATFORM, (0.0, 0.0, 0.0), inf, is_spread=True)
+    link_places: ClassVar[tuple[BodyPlace, ...]] = (
         BodyPlace('rods', (0.0, 0.0, 0.0), inf, is_spread=True, links=RODS),)
+
+    @classmethod
+    def of(cls, geometry: Geometry, masses: Masses,
+           gravity: tuple[float, float, float] = (0.0, 0.0, -9.81), limits: Limits = UNLIMITED,
+           **more: Any) -> Self:
+        """Return the robot with bodies of some masses; for `limits` see `structure_of`."""
+        structure = structure_of(geometry, limits)
+        inertial = np.array([
+            *(body_at(mass, (0.0,) * 3, np.zeros((3, 3)))
+              for mass in (*masses.slides, *masses.lifts)),
+            *(rod(geometry.rod_length, mass) for mass in masses.rods),
+            body_at(masses.total, masses.centre, masses.inertia_tensor)])
+        return cls(structure=structure, bodies=np.array([
+            structure.links[name][0] for name in LINKS]), inertial=inertial,
+            armature=np.zeros(COUNT), gravity=gravity, geometry=geometry, **more)
 
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
@@ -381,44 +405,10 @@ class Alike:
         return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE,
                                   joints=joints) for name, joints in ALIKE.items())
 
-
-@dataclass(frozen=True)
-class ThreePprs(Alike):
-    """The 3-PPRS; its members are those of `Mechanism`.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    masses : Masses
-    gravity : 3 floats
-        Gravity acceleration in `base` [m/s^2].
-    radii : mapping of str to float
-        At which loads of C_i and A_i rub [m], where known.
-    bounds : SingularityBounds
-    printed : bool
-        Take Eq. (7) to the letter.
-    """
-
-    geometry: Geometry
-    masses: Masses
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-    radii: Mapping[str, float] = field(default_factory=dict)
-    bounds: SingularityBounds = UNBOUNDED
-    printed: bool = False
-
-    # No two kinds of bodies and passive joints are alike.
-    structure: ClassVar[None] = None
-    drives: ClassVar[tuple[str, ...]] = DRIVES
-    motors: ClassVar[Mapping[str, tuple[float, ...]]] = {}
-    armature: ClassVar[Array] = np.zeros(COUNT)
-    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
-    turning: ClassVar[tuple[str, ...]] = ()
-    kind: ClassVar[str] = PLATFORM
-
     @property
     def moved_mass(self) -> float:
         """Mass of the platform and its payload [kg]."""
-        return self.masses.total
+        return float(self.masses[-1])
 
     @property
     def position_step(self) -> float:
@@ -435,38 +425,26 @@ class ThreePprs(Alike):
             blocks.get(joint, {}).get(key, 0.0) for joint in (REVOLUTE, SPHERICAL)
             for key in ('viscous', 'torque', 'coulomb', 'radius')))
 
-    def heavier(self, link: str, mass: float) -> ThreePprs:
-        """Return the robot with a payload, or with rods, that weigh more [kg].
-
-        The masses are not checked, see `with_masses`.
-        """
-        if link == 'rods':
-            return self.with_masses(rods=tuple(m_b + mass for m_b in self.masses.rods))
-        return self.with_masses(payload=self.masses.payload + mass)
-
-    def with_masses(self, **masses: Any) -> ThreePprs:
-        """Return the robot with some fields of `Masses` changed, unchecked.
-
-        A fit changes one coefficient at a time, and an inertia about one axis alone belongs to no
-        body. Build `Masses` from the result to check them.
-        """
-        altered = copy.copy(self.masses)
-        for name, value in masses.items():
-            object.__setattr__(altered, name, value)
-        return replace(self, masses=altered)
+    def heavier(self, link: str, mass: float) -> Self:
+        """Return the robot with a payload, or with rods, that weigh more [kg]."""
+        added = np.zeros_like(self.inertial)
+        if link == PLATFORM:
+            added[-1] = body_at(mass, tuple(self.centre_of(link)), np.zeros((3, 3)))
+        else:
+            added[OF_RODS] = rod(self.geometry.rod_length, mass)
+        return replace(self, inertial=self.inertial + added)
 
     @cached_property
     def _chains(self) -> tuple[closed_form.Chain, ...]:
         """Constants of the chains."""
-        geometry, masses = self.geometry, self.masses
+        geometry, masses = self.geometry, self.masses[:-1].reshape(3, 3)
         delta = np.asarray(geometry.chain_angles)
         cos, sin = np.cos(delta), np.sin(delta)
         joints = geometry.platform_radius * np.exp(1j * np.asarray(geometry.platform_angles))
         left = np.linalg.pinv(np.stack((-sin, cos), axis=1))
         # The weights with which the three directions n_i add up to nothing.
         balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
-        constants = np.stack((cos, sin, joints.real, joints.imag, *left, balance, masses.slides,
-                              masses.lifts, masses.rods), axis=1)
+        constants = np.stack((cos, sin, joints.real, joints.imag, *left, balance, *masses), axis=1)
         return tuple(closed_form.Chain(*chain) for chain in constants.tolist())
 
     def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
@@ -478,19 +456,20 @@ class ThreePprs(Alike):
         drives : (OF_DRIVE, 6) array, optional
             Without it the drives have no friction.
         """
-        geometry, masses, bounds = self.geometry, self.masses, self.bounds
+        geometry, bounds = self.geometry, self.bounds
+        mass, centre, I = about_centre(self.inertial[-1])  # noqa: E741
         friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
             closed_form.DriveParameters(*drive)
             for drive in drives[[tree.VISCOUS, tree.COEFFICIENT, tree.WIDTH]].T.tolist())
         first, second, third = self._chains
         return row_of(closed_form.Parameters(
             geometry.base_radius, geometry.rod_length, geometry.platform_radius,
-            geometry.elbow_sign, (first, second, third), masses.total, Vector(*masses.centre),
-            Vector(*masses.inertia[:3]), Vector(*masses.inertia[3:]), Vector(*self.gravity),
+            geometry.elbow_sign, (first, second, third), mass, Vector(*centre),
+            Vector(*np.diag(I)), Vector(I[0, 1], I[0, 2], I[1, 2]), Vector(*self.gravity),
             float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
 
-    def one_pass(self, motion: PlatformMotion, parameters: Array, closed: object,
-                 has_state: bool = False) -> tree.InverseDynamicsResult | None:
+    def one_pass(self, motion: Any, parameters: Any, closed: object, has_state: bool = False,
+                 start: object = None) -> tree.InverseDynamicsResult | None:
         """Return the forces for a motion, friction included; see `Mechanism.one_pass`."""
         # Memory is what limits long motions: the rows that only a state reads take 12 % longer.
         size = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
@@ -501,16 +480,9 @@ class ThreePprs(Alike):
         return tree.InverseDynamicsResult(
             None, table, table[closed_form.POSITION:closed_form.GUIDE_LOAD])
 
-    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array) -> Mechanism:
-        """Return the robot as a mechanism; see `tree_structure`."""
-        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts))
-        bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
-        return Tree(structure, bodies, structure.inertial[bodies], np.zeros(COUNT), self.gravity,
-                    self.radii)
-
     # --- motion --------------------------------------------------------------------------------
 
-    def motion_of_drives(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          closed: dict[Any, Array] | None = None) -> PlatformMotion:
         """Return the platform's motion that belongs to a continuous motion of the drives.
 
@@ -520,7 +492,7 @@ class ThreePprs(Alike):
 
         Parameters
         ----------
-        position, velocity, acceleration : (N, 6) array_like
+        position, velocity, acceleration : (N, 6) arrays
             q [m], q_dot [m/s], q_ddot [m/s^2] in drive order.
         closed : dict of Structure to array, optional
             Coordinates at the last sample of another motion, from which this one goes on; brought
@@ -536,7 +508,7 @@ class ThreePprs(Alike):
             Where the geometry's home pose is itself singular.
         """
         q = checked_matrix('drive positions', position, COUNT)
-        structure, closed = structure_of(self.geometry), {} if closed is None else closed
+        structure, closed = self.structure, {} if closed is None else closed
         try:
             links = LinkMotion.of(structure, q, np.asarray(velocity), np.asarray(acceleration),
                                   nearby=closed.get(structure))
@@ -554,8 +526,8 @@ class ThreePprs(Alike):
         """Return the platform at rest at its home pose."""
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
-    def state(self, motion: PlatformMotion, reversal: Reversal,
-              friction: Joints = FRICTIONLESS_JOINTS, closed: object = None,
+    def state(self, motion: Any, reversal: Reversal, friction: Any = FRICTIONLESS_JOINTS,
+              closed: object = None,
               found: tree.InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a platform motion; `found` as of `one_pass`.
 
@@ -579,6 +551,11 @@ class ThreePprs(Alike):
 
     def remember(self, state: MechanismState, closed: object) -> None:
         """Store nothing: poses have a closed form."""
+
+    def tree_motion(self, state: MechanismState) -> LinkMotion:
+        """Return where the links of the tree are in a state, at rest."""
+        still = np.zeros_like(state.position)
+        return self.at(state.position, still, still)
 
     def kinematics(self, state: MechanismState) -> ClosedForm:
         """Return the kinematics of a state that lacks them."""
@@ -646,15 +623,6 @@ class ThreePprs(Alike):
         return {'load': state.friction_load, 'rod_angle': np.tile(state.links.rod_angle, 2),
                 'platform_x': x, 'platform_y': y, 'platform_z': z,
                 'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
-
-    def require_bodies(self, key: str, value: Any) -> None:
-        """Raise ModelError, of a key and its value, for bodies that cannot be."""
-        if not self.masses.total > 0 or min(self.masses.rods) < 0:
-            raise ModelError(key, value, 'leave masses greater than 0')
-
-
-class Tree(Alike, Mechanism):
-    """A 3-PPRS as a mechanism."""
 
 
 def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:

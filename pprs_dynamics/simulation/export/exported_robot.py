@@ -31,7 +31,7 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, ROBOT
-from pprs_dynamics.physics.three_pprs.robot import BALLS, HINGES
+from pprs_dynamics.physics.three_pprs.robot import HINGES
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -83,13 +83,10 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
             left.append(effect.name)
     if kind == URDF:
         if tuple(model.robot.gravity) != STANDARD_GRAVITY:
-            left.append('robot.gravity' if model.moves_joints else 'gravity')
+            left.append(next(key for key in ('gravity', 'robot.gravity') if key in model.values))
         robot = replace(robot, gravity=STANDARD_GRAVITY)
-        left += ([loop.name for loop in model.robot.structure.loops] if model.moves_joints
-                 else list(BALLS))
-    name, mechanism = (ROBOT, robot) if model.moves_joints else (
-        'three_pprs', robot.as_mechanism(model.limits.strokes, model.limits.efforts))
-    return described(name, mechanism, {
+        left += [loop.name for loop in model.robot.structure.loops]
+    return described(ROBOT, robot, {
         name: {key: value for key, value in numbers.items() if value}
         for name, numbers in joints.items()}, tuple(left))
 

@@ -18,7 +18,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import OfPlace, PassiveJointEffect
-from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, Reversal
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
@@ -67,7 +66,7 @@ class JointFrictionEffect(PassiveJointEffect):
         """Return the effect in the passive joints of a robot, with the radii of their loads."""
         return cls.at_places(
             tuple((joint.name, joint.radius or RADIUS) for joint in robot.passive_joints),
-            alike_joints(robot))
+            robot.alike_joints)
 
     @classmethod
     def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:

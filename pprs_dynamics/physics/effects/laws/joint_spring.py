@@ -13,7 +13,6 @@ from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.physics.effects.effect import Parameter, Product
 from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, OfPlace
-from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
 
 
@@ -60,7 +59,7 @@ class JointSpring(BodyEffect):
         """Return the effect in the passive joints of a robot that have a position."""
         return cls.at_places(
             tuple((joint.name, joint.turns) for joint in robot.passive_joints
-                  if joint.has_position), alike_joints(robot))
+                  if joint.has_position), robot.alike_joints)
 
     @classmethod
     def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:

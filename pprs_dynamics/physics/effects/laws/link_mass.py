@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
-from pprs_dynamics.physics.mechanism.alike import alike_links
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
@@ -52,4 +51,4 @@ class LinkMass(AddedBody):
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the effect on the links of a robot that have mass."""
-        return cls.at_places(robot.link_places, alike_links(robot), robot.moved_mass)
+        return cls.at_places(robot.link_places, robot.alike_links, robot.moved_mass)

@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""More moments of inertia of platform and payload than the model says."""
+"""More moments of inertia of what carries the tool than the model says."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 
@@ -18,7 +21,7 @@ class PlatformInertia(BodyEffect):
 
     Equation
     --------
-    [I] -> [I] + [I_xx I_xy I_xz; I_xy I_yy I_yz; I_xz I_yz I_zz], in platform
+    [I] -> [I] + [I_xx I_xy I_xz; I_xy I_yy I_yz; I_xz I_yz I_zz], in the tool's axes
 
     Symptom
     -------
@@ -41,6 +44,8 @@ class PlatformInertia(BodyEffect):
     """
 
     name = 'platform_inertia'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    is_in_payload = True
     idealised = False
     linear = (
         *(Parameter(axes, f'I_{axes}', 'kg m^2', f'moment of inertia beyond {axes} of the model',
@@ -51,6 +56,5 @@ class PlatformInertia(BodyEffect):
 
     def changed(self, robot: Any) -> Any:
         """Return the robot with the other inertia."""
-        inertia = tuple(moment + self.values[p.name] for moment, p in zip(
-            robot.masses.inertia, self.parameters, strict=True))
-        return robot.with_masses(inertia=inertia)
+        added = [self.values[axes] for axes in ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')]
+        return robot.with_body(robot.structure.tool, np.array([0.0] * 4 + added))
