@@ -88,7 +88,8 @@ class MotionLimits:
         """
         if model.moves_joints:
             return self._room(model)[0]
-        geometry = model.robot.geometry
+        robot: Any = model.robot
+        geometry = robot.geometry
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
         rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
@@ -126,7 +127,8 @@ class MotionLimits:
 
     def _of_platform(self, model: DriveModel, state: Any) -> dict[str, Array]:
         """Return the use of what limits the 3-PPRS alone, (N,) each."""
-        bounds, left, chains = model.robot.bounds, 1 - self.margin, state.links
+        robot: Any = model.robot
+        bounds, left, chains = robot.bounds, 1 - self.margin, state.links
         angles = {'rod angle of chain': (1 - np.abs(chains.sin_u)) / (left * (1 - bounds.rod_sine))}
         if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
             angles['cosine of rod angle'] = (1 - np.abs(chains.cos_u)) / (
@@ -134,7 +136,7 @@ class MotionLimits:
         return {
             **{f'{name} {k + 1}': share[:, k] for name, share in angles.items() for k in range(3)},
             'tilt of the platform': state.motion.tilt / (left * self.tilt),
-            'condition number': condition_number(model.robot.geometry, chains.J) / (
+            'condition number': condition_number(robot.geometry, chains.J) / (
                 left * min(bounds.condition_number, self.condition_number))}
 
     def _room(self, model: DriveModel) -> tuple[Array, Array]:

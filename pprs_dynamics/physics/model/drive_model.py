@@ -36,6 +36,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import (
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, Motion, Reversal
 from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
@@ -84,7 +85,7 @@ class DriveModel:
         The file that it came from, if any.
     """
 
-    robot: Any
+    robot: Mechanism
     effects: tuple[Effect, ...]
     reversal: Reversal
     limits: DriveLimits
@@ -130,7 +131,6 @@ class DriveModel:
         """
         with source_of_errors(source):
             values = checked_values(parameters)
-            robot: Any
             robot, own, reversal, limits = (
                 read_mechanism(values, Path(source).parent) if is_described(parameters)
                 else read_platform(values))
@@ -146,14 +146,12 @@ class DriveModel:
     @property
     def kind(self) -> str:
         """One of 'platform', 'slide', 'mechanism'; effects say in which of them they act."""
-        kind: str = self.robot.kind
-        return kind
+        return self.robot.kind
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
-        drives: tuple[str, ...] = self.robot.drives
-        return drives
+        return self.robot.drives
 
     @property
     def moves_joints(self) -> bool:
@@ -189,14 +187,12 @@ class DriveModel:
     @property
     def speed_limits(self) -> Array:
         """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
-        speed: Array = self.robot.structure.speed
-        return speed
+        return self.robot.structure.speed
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
-        faults: tuple[str, ...] = self.robot.structure.description.faults
-        return () if self.values.get('links.inertia') else faults
+        return () if self.values.get('links.inertia') else self.robot.structure.description.faults
 
     @property
     def efforts_in_amperes(self) -> bool:
@@ -294,9 +290,7 @@ class DriveModel:
 
     def mechanism(self, motion: Motion, closed: dict[Any, Array] | None = None) -> MechanismState:
         """Return the mechanism's state for a motion; see `drive_forces` and `ModelState.closed`."""
-        state: MechanismState = self.robot.state(motion, self.reversal, self._joint_friction,
-                                                 closed)
-        return state
+        return self.robot.state(motion, self.reversal, self._joint_friction, closed)
 
     @cached_property
     def _joint_friction(self) -> Any:
@@ -344,7 +338,7 @@ class DriveModel:
                 mechanism = self.mechanism(motion, closed)
                 forces = self.forces_at(mechanism, state)
             if state is not None:
-                self.robot.remember(mechanism, closed)
+                self.robot.remember(mechanism, state.closed)
             return forces
         forces = Forces(
             found.efforts[rows.TOTAL], lambda: self._own_parts(found.efforts),
