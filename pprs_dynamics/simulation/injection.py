@@ -506,7 +506,6 @@ def links_that_weigh(model: DriveModel) -> dict[str, tuple[str, ...]]:
 
 def _payload_offset(run: Injection) -> Injected:
     """Inject another centre of mass of what carries the tool."""
-    _require_platform(run.model, 'payload_offset')
     offset = run.sizes(lambda: {
         axis: run.size(0.003, 0.015) * float(run.random.choice((-1.0, 1.0))) for axis in 'xyz'})
     run.engine.shift_tool(np.array([*offset.values()]))
@@ -515,7 +514,6 @@ def _payload_offset(run: Injection) -> Injected:
 
 def _platform_inertia(run: Injection) -> Injected:
     """Inject a beam across the tool, of inertia I (E - a a^T), a = (cos beta, sin beta, 0)."""
-    _require_platform(run.model, 'platform_inertia')
     sizes = run.sizes(lambda: {
         'inertia': run.scale * float(np.exp(run.random.uniform(np.log(0.01), np.log(0.04)))),
         'angle': float(run.random.uniform(0.0, np.pi))})
@@ -625,12 +623,6 @@ def _tool_drag(run: Injection) -> Injected:
     drag = coefficient * np.hypot(1.0, speed / turbulent) * velocity
     run.engine.wrench = run.engine.wrench + np.concatenate((drag, np.zeros_like(drag)), axis=1)
     return None, sizes
-
-
-def _require_platform(model: DriveModel, name: str) -> None:
-    """Raise InjectedEffectError for a robot whose payload_mass has a centre and an inertia."""
-    if not model.robot.tool_place.is_spread:
-        raise InjectedEffectError(f'{name} acts on the platform of a 3-PPRS: choose payload_mass')
 
 
 def require_tool(model: DriveModel, name: str) -> None:
