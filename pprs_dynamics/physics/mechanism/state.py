@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     TRANSMITTED,
     InverseDynamicsResult,
 )
-
-if TYPE_CHECKING:
-    from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 Motion = JointMotion | PlatformMotion
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
@@ -158,7 +155,7 @@ class MechanismState(JointMotion):
         The motion of the tool, where the state was made from it.
     """
 
-    robot: Mechanism = field(kw_only=True)
+    robot: Any = field(kw_only=True)
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Any = field(default=None, kw_only=True)
@@ -176,14 +173,16 @@ class MechanismState(JointMotion):
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
-        return self.robot.drives
+        drives: tuple[str, ...] = self.robot.drives
+        return drives
 
     @cached_property
     def inverse_dynamics(self) -> InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
-        return self.robot.inverse_dynamics(self)
+        found: InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
+        return found
 
     @cached_property
     def links(self) -> Any:
@@ -211,7 +210,8 @@ class MechanismState(JointMotion):
     @cached_property
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
-        return self.transmitted + self.robot.armature * self.acceleration
+        force: Array = self.transmitted + self.robot.armature * self.acceleration
+        return force
 
     @property
     def transmitted(self) -> Array:
@@ -226,7 +226,8 @@ class MechanismState(JointMotion):
     @cached_property
     def friction_load(self) -> Array:
         """Load of a drive's guide or gear [N m, N], without a sign; 0 if it is not known."""
-        return self.robot.friction_load(self)
+        load: Array = self.robot.friction_load(self)
+        return load
 
     @property
     def tool_velocity(self) -> Array:
@@ -243,13 +244,17 @@ class MechanismState(JointMotion):
         """Return the state with a drive at other positions; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
-        return self.robot.perturbed(self, position, self.acceleration)
+        return self._perturbed(position, self.acceleration)
 
     def accelerated(self, drive: int, change: float) -> MechanismState:
         """Return the state with another acceleration of a drive."""
         acceleration = self.acceleration.copy()
         acceleration[:, drive] += change
-        return self.robot.perturbed(self, self.position, acceleration)
+        return self._perturbed(self.position, acceleration)
+
+    def _perturbed(self, position: Array, acceleration: Array) -> MechanismState:
+        perturbed: MechanismState = self.robot.perturbed(self, position, acceleration)
+        return perturbed
 
     def friction_efforts(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
@@ -265,7 +270,7 @@ class MechanismState(JointMotion):
         vars(state)['reactions'] = self.reactions
         return state
 
-    def with_load(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
+    def with_load(self, robot: Any, load: StructureLoad | None = None) -> MechanismState:
         """Return a state of this motion with other bodies, and with an additional load."""
         if load is None:
             load = self.load
