@@ -29,6 +29,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Joint,
     Loop,
 )
+from pprs_dynamics.physics.mechanism.evaluation import run
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.state import StructureLoad
@@ -142,13 +143,29 @@ class LinkMotion:
         return tree.link_jacobians(self.structure.tables, self.motion, self.motion.drive_to_joint)
 
     def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None) -> Loads:
-        """Return the frictionless loads of joints and closures; see `Evaluation.forces`."""
-        return self.structure.evaluation.forces(
-            self.rows, inertial, gravity, {} if load is None else self.wrenches_of(load))
+        """Return the frictionless loads of joints and closures.
+
+        Parameters
+        ----------
+        inertial : (J + 1, 10) array
+        gravity : (3,) array
+        load : StructureLoad, optional
+        """
+        evaluation = self.structure.evaluation
+        table = np.zeros((len(self.rows), tree.length_of(Loads, evaluation.sizes)))
+        found = tree.views(Loads, evaluation.sizes, table)
+        if load is not None:
+            self._apply(load, found)
+        evaluation.run(tree.FORCES | tree.KEPT, self.rows, bodies=(inertial, gravity), loads=table)
+        return found
 
     def friction(self, loads: Loads, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints under loads, (N, D)."""
-        return self.structure.evaluation.joint_friction(self.rows, loads, friction)
+        efforts: Array = np.zeros((len(self.rows), len(self.structure.drives)))
+        # Loads are everybody's: what is of one friction alone does not go through them.
+        run(tree.oppose_friction, *self.structure.evaluation.packed, self.rows, loads.links,
+            loads.loops, np.array(friction), np.empty(len(self.structure.home)), efforts)
+        return efforts
 
     @property
     def tool_velocity(self) -> Array:
@@ -164,25 +181,24 @@ class LinkMotion:
         position: Array = t.ratio[row] * self.motion.q[:, t.coordinate[row]] + t.offset[row]
         return position
 
-    def wrenches_of(self, load: StructureLoad) -> dict[int, tuple[Array, Array]]:
-        """Return a load as wrenches that links apply, by the joints that move them."""
+    def _apply(self, load: StructureLoad, found: Loads) -> None:
+        """Add a load, as wrenches that links apply, to loads by the joints that move them."""
         t, m = self.structure.tables, self.motion
         row, _ = self.structure.links[self.structure.tool]
         arm = self.frame_of(self.structure.tool).p - m.p[:, row]
         force, moment = load.wrench[:, :3], load.wrench[:, 3:]
-        found = {row: (force, moment + np.cross(arm, force))}
+        found.f[:, row] += force
+        found.n[:, row] += moment + np.cross(arm, force)
         for name, torque in load.torques.items():
             row = self.structure.rows[name]
             along = torque[:, None] * m.z[:, row]
-            none = np.zeros_like(along)
             # What the link of a joint applies, the one that it hangs on takes back.
             for joint, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
-                arm = m.p[:, row] - m.p[:, joint]
-                force, moment = (none, sign * along) if t.turns[row] else (
-                    sign * along, sign * np.cross(arm, along))
-                before = found.get(joint, (none, none))
-                found[joint] = (before[0] + force, before[1] + moment)
-        return found
+                if t.turns[row]:
+                    found.n[:, joint] += sign * along
+                else:
+                    found.f[:, joint] += sign * along
+                    found.n[:, joint] += sign * np.cross(m.p[:, row] - m.p[:, joint], along)
 
     def regressor(self, rows: Integers, gravity: Array) -> Array:
         """Return the derivatives of the efforts by the parameters of bodies, (N, D, 10 B)."""

@@ -19,7 +19,7 @@ R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 8.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, cached_property
 from math import ceil, cos, sin, tanh
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
@@ -1070,43 +1070,6 @@ class Evaluation:
         """
         rows = np.zeros((len(q), self._lengths[0]))
         return rows, self.run(MOTION | KEPT, rows, np.array((q, v, a)), start, nearby)
-
-    def forces(self, rows: Array, inertial: Array, gravity: Array,
-               wrenches: Mapping[int, tuple[Array, Array]]) -> Loads:
-        """Return the loads of joints and closures, for rows of `forward_kinematics`.
-
-        Parameters
-        ----------
-        rows : (N, K) array
-        inertial : (J + 1, 10) array
-        gravity : (3,) array
-        wrenches : mapping of int to (force, moment), (N, 3) each
-            That links apply to the world, by the joints that move them, in the base's frame, about
-            the origins of these joints [N, N m].
-        """
-        loads = np.zeros((len(rows), self._lengths[1]))
-        o = views(Loads, self.sizes, loads)
-        for joint, (force, moment) in wrenches.items():
-            o.f[:, joint] += force
-            o.n[:, joint] += moment
-        self.run(FORCES | KEPT, rows, bodies=(inertial, gravity), loads=loads)
-        return o
-
-    def joint_friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
-        """Return the drives' efforts against friction of joints under loads, (N, D).
-
-        Parameters
-        ----------
-        rows : (N, K) array
-            See `forward_kinematics`.
-        loads : Loads
-        friction : JointFriction
-        """
-        found = np.zeros((len(rows), len(self.tables.drives)))
-        # Loads are everybody's: what is of one friction alone does not go through them.
-        run(oppose_friction, *self.packed, rows, loads.links, loads.loops, np.array(friction),
-            np.empty(len(self.home)), found)
-        return found
 
     def run(self, stages: int, rows: Array | None = None, given: Array | None = None,
             start: Array | None = None, nearby: Array | None = None,
