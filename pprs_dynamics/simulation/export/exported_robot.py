@@ -30,7 +30,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import APPROACHES, ROBOT
+from pprs_dynamics.physics.model.keys import APPROACHES, EQUATIONS, JOINTS, ROBOT
 from pprs_dynamics.physics.three_pprs.robot import HINGES
 
 MJCF, URDF = 'mjcf', 'urdf'
@@ -49,6 +49,8 @@ OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
 }
 OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
               'position': SPRINGREF}
+OF_KEYS = {'friction.drives.viscous': DAMPING, 'friction.viscous': DAMPING,
+           'friction.coulomb': FRICTION, 'robot.armature': ARMATURE}
 # By joint, the numbers that a format names.
 Joints = dict[str, dict[str, float]]
 
@@ -67,8 +69,7 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
         For bodies that no real ones are, and closures that no format has.
     """
     joints: Joints = {}
-    left = [key for key, numbers in (_of_mechanism if model.moves_joints else _of_platform)(model)
-            if not _take(joints, numbers, HELD[kind])]
+    left = [key for key, numbers in _of_model(model) if not _take(joints, numbers, HELD[kind])]
     # Joints of a format that passive joints of the model are; those without do not turn alone.
     passive = {joint.name: joint.joints for joint in model.robot.passive_joints
                if joint.has_position}
@@ -106,36 +107,30 @@ def _take(joints: Joints, numbers: Joints | None, held: set[str]) -> bool:
     return True
 
 
-def _of_platform(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
-    """Yield keys of the paper's friction and their numbers; None for loads, which no format has."""
-    values = model.values
-    yield 'friction.drives.viscous', _spread(model, 'friction.drives.viscous', DAMPING)
-    yield ('friction.revolute.viscous',
-           {name: {DAMPING: values['friction.revolute.viscous']} for name in HINGES})
-    for key in ('friction.drives.coulomb', *(
+def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+    """Yield keys of rotors and friction, also of passive joints; None for those of no format.
+
+    No format has loads that friction follows.
+    """
+    values, loops = model.values, {loop.name for loop in model.robot.structure.loops}
+    for key, number in OF_KEYS.items():
+        if key in values:
+            yield key, _spread(model, key, number)
+    if viscous := values.get('friction.revolute.viscous'):
+        yield 'friction.revolute.viscous', {name: {DAMPING: viscous} for name in HINGES}
+    for key in ('friction.offset', 'friction.drives.coulomb', *(
             f'friction.{joint}.coulomb' for joint in ('revolute', 'spherical')
-            if values[f'friction.{joint}.diameter']), 'friction.spherical.viscous'):
-        if np.any(values[key]):
+            if values.get(f'friction.{joint}.diameter')), 'friction.spherical.viscous'):
+        if np.any(values.get(key, 0.0)):
             yield key, None
-    if values['friction.approach'] != APPROACHES[0]:
-        yield 'friction.approach', None
-    if values['equations'] != 'corrected':
-        yield 'equations', None
-
-
-def _of_mechanism(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
-    """Yield keys of rotors and friction, also of passive joints; None for those of no format."""
-    yield 'friction.viscous', _spread(model, 'friction.viscous', DAMPING)
-    yield 'friction.coulomb', _spread(model, 'friction.coulomb', FRICTION)
-    if np.any(model.values['friction.offset']):
-        yield 'friction.offset', None
-    yield 'robot.armature', _spread(model, 'robot.armature', ARMATURE)
-    loops = {loop.name for loop in model.robot.structure.loops}
-    for key, value in model.values.items():
-        name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
-        if key.startswith('friction.joints.') and parameter != 'radius' and value:
-            number = None if name in loops else OF_PASSIVE.get(parameter)
-            yield key, None if number is None else {name: {number: value}}
+    for key, usual in (('friction.approach', APPROACHES[0]), ('equations', EQUATIONS[0])):
+        if values.get(key, usual) != usual:
+            yield key, None
+    for key, value in values.items():
+        name, _, parameter = key.removeprefix(JOINTS).rpartition('.')
+        if key.startswith(JOINTS) and parameter != 'radius' and value:
+            of_passive = None if name in loops else OF_PASSIVE.get(parameter)
+            yield key, None if of_passive is None else {name: {of_passive: value}}
 
 
 def _spread(model: DriveModel, key: str, number: str) -> Joints:
