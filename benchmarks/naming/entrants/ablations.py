@@ -83,7 +83,7 @@ class BayesianInformation(PriorCosts):
         """Return ln n for each time of a change."""
         return {SINCE: 1, DURING: 2}.get(course.kind, 0) * log(self.samples)
 
-    def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
+    def of_pattern(self, families: int, patterns: int) -> CostTerms:
         """Return 0: patterns are effects like others."""
         return CostTerms()
 

@@ -286,9 +286,9 @@ class Answer:
         """Return patterns of no catalogue, that of the largest share of its drive's error first."""
         by_drive = {pattern.d: pattern for pattern in self.table.patterns}
         statements = [
-            word_statement(by_drive[d], candidate, self.fitted.fit.of(block),
-                           self._evidence(candidate))
-            for candidate in self.fitted.unknowns for d, block in candidate.parts.items()]
+            word_statement(by_drive[candidate.drive], candidate,
+                           self.fitted.fit.of(candidate.block), self._evidence(candidate))
+            for candidate in self.fitted.unknowns]
         return tuple(sorted(statements, key=lambda statement: -statement.share_of_error))
 
     # Queries on the table

@@ -112,8 +112,8 @@ def _search(residuals: Residuals, drive: int) -> tuple[list[Statement], NoiseSpe
             break
         candidate, found, evidence, other_variables = winner
         statements.append(word_statement(drive_patterns, candidate, found.of(
-            candidate.parts[drive]), evidence, other_variables))
-        blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
+            candidate.block), evidence, other_variables))
+        blocks += [candidate.block, *_carried(drive_patterns, candidate)]
         fit = regression.fit(blocks, found)
     return statements, regression.noise(fit)[drive]
 
@@ -132,10 +132,9 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
     scored = []
     for candidate, near in chosen.values():
         refined = drive_patterns.refined(candidate, near)
-        if refined.pattern.kind in PLACES and np.mean(
-                refined.rows[drive_patterns.d][0] != 0) > MOST_SHARE:
+        if refined.pattern.kind in PLACES and np.mean(refined.rows[0] != 0) > MOST_SHARE:
             continue
-        found = regression.fit([*blocks, *refined.blocks], near)
+        found = regression.fit([*blocks, refined.block], near)
         scored.append((fit.deviance - found.deviance - refined.terms.total, refined, found))
     scored.sort(key=lambda scored: -scored[0])
     if not scored or scored[0][0] <= 0:

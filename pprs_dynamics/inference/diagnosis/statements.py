@@ -130,7 +130,7 @@ def word_statement(
     pattern, variable = candidate.pattern, candidate.family.variable
     drive, series = drive_patterns.residuals.drives[drive_patterns.d], drive_patterns.series
     error = series.error
-    columns = candidate.rows[drive_patterns.d][:, series.index]
+    columns = candidate.rows[:, series.index]
     shape = coefficients @ columns
     total = max(float(error @ error), 1e-300)
     limits, share, time = pattern.limits, 0.0, 1.0

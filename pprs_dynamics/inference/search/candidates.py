@@ -256,17 +256,16 @@ class EffectCandidate:
 
 @dataclass(frozen=True, eq=False)
 class UnknownCandidate:
-    """A pattern of the error that belongs to no effect of the catalogue.
-
-    Along a variable that all drives share it may be on several drives, with a size on each.
+    """A pattern of the error of a drive that belongs to no effect of the catalogue.
 
     Parameters
     ----------
     family : Family
     pattern : Pattern
-    rows : mapping of drive to (1 or 2, M) array
+    drive : int
+    rows : (1 or 2, M) array
         In time [1].
-    parts : mapping of drive to Block
+    block : Block
     terms : CostTerms
         Of its prior cost.
     """
@@ -275,8 +274,9 @@ class UnknownCandidate:
 
     family: Family
     pattern: Pattern
-    rows: Mapping[int, Array] = field(repr=False)
-    parts: Mapping[int, Block] = field(repr=False)
+    drive: int
+    rows: Array = field(repr=False)
+    block: Block = field(repr=False)
     terms: CostTerms
 
     @property
@@ -290,14 +290,9 @@ class UnknownCandidate:
         return (1, self.family.variable, self.drives, repr(self.pattern))
 
     @property
-    def blocks(self) -> tuple[Block, ...]:
-        """One for each drive."""
-        return tuple(self.parts.values())
-
-    @property
     def drives(self) -> tuple[int, ...]:
-        """On which it is."""
-        return tuple(self.parts)
+        """Drives on which it sits."""
+        return (self.drive,)
 
     @cached_property
     def key(self) -> Hashable:
@@ -413,7 +408,7 @@ class CandidateSet:
     def blocks_of(self, candidate: Candidate) -> tuple[Block, ...]:
         """Return the columns of a candidate."""
         if isinstance(candidate, UnknownCandidate):
-            return candidate.blocks
+            return (candidate.block,)
         return tuple(self.blocks[component] for component in candidate.components)
 
 
@@ -499,10 +494,10 @@ class PriorCosts:
         times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
         return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.onset_odds)
 
-    def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
+    def of_pattern(self, families: int, patterns: int) -> CostTerms:
         """Return the prior cost of an unknown pattern among those tried on each drive."""
         return CostTerms(names=self.of_name() - 2 * log(self.decisions.unknown_odds),
-                         drives=self.of_drives(drives),
+                         drives=self.of_drives(1),
                          shapes=2 * log(families) + 2 * log(patterns))
 
     def of_sign(self, deviations: float) -> float:

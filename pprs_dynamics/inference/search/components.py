@@ -380,8 +380,7 @@ class Components:
         """Return the force of a candidate of a set, (M, D) [N]."""
         force = np.zeros(shape)
         if isinstance(candidate, UnknownCandidate):
-            for d, block in candidate.parts.items():
-                force[:, d] = fitted.fit.of(block) @ candidate.rows[d]
+            force[:, candidate.drive] = fitted.fit.of(candidate.block) @ candidate.rows
             return force
         for component in candidate.components:
             c = component.every(fitted.coefficients(component))

@@ -172,7 +172,7 @@ class FittedSets:
                ) -> list[Block]:
         """Return the columns of candidates, then those of what they leave open."""
         return [*(block for c in candidates for block in (
-            c.blocks if isinstance(c, UnknownCandidate)
+            (c.block,) if isinstance(c, UnknownCandidate)
             else map(self.components.block, c.components))),
             *(block for of_component in nuisance.values() for block in of_component.values())]
 

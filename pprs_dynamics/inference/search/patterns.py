@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from itertools import chain, compress
 from typing import NamedTuple
 
@@ -59,9 +59,6 @@ class Pattern(NamedTuple):
     scale: float = 0.0
 
 
-Once = Callable[[str, Callable[[], 'list[Family]']], 'list[Family]']
-
-
 @dataclass(frozen=True, eq=False)
 class Family:
     """Columns of one variable and the patterns tried on them.
@@ -101,18 +98,8 @@ class Family:
         return self.weights[index:index + 1] @ self.columns
 
 
-def build_families(residuals: Residuals, drive: int,
-                   once: Once = lambda name, make: make()) -> list[Family]:
-    """Return the families of one drive, over the variables that are known.
-
-    Parameters
-    ----------
-    residuals : Residuals
-    drive : int
-    once : callable, optional
-        From a name and what makes families to these: it may keep those that are the same for
-        every drive that has them.
-    """
+def build_families(residuals: Residuals, drive: int) -> list[Family]:
+    """Return the families of one drive, over the variables that are known."""
     families = [_offset(len(residuals))]
     direction = residuals.variable('direction', drive)
     velocity = residuals.variable('velocity', drive)
@@ -125,8 +112,7 @@ def build_families(residuals: Residuals, drive: int,
         values = residuals.variable(name, drive)
         families += _maybe(_scalar, name, values, sign if name in DIRECTED else None, 1)
     for name in PLATFORM:
-        families += once(name, partial(
-            _maybe, _scalar, name, residuals.variable(name, drive), None, 1))
+        families += _maybe(_scalar, name, residuals.variable(name, drive), None, 1)
     position = residuals.variable('position', drive)
     if position is not None and np.ptp(position) > 0:
         families.append(_ripple(position))
@@ -137,8 +123,7 @@ def build_families(residuals: Residuals, drive: int,
         build = _velocity if name == 'velocity' else _scalar
         for other in others:
             whose = f'{name} of {residuals.drives[other]}'
-            families += once(whose, partial(
-                _maybe, build, whose, residuals.variable(name, other), None, len(others)))
+            families += _maybe(build, whose, residuals.variable(name, other), None, len(others))
     return families
 
 

@@ -27,7 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
-from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
+from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
@@ -239,9 +239,7 @@ class Search:
 
 def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     """Return the patterns of no catalogue of all drives."""
-    shared: Shared = {}
-    return [DrivePatterns(fits.regression, fits.prior_costs, d, shared=shared)
-            for d in fits.regression.drives]
+    return [DrivePatterns(fits.regression, fits.prior_costs, d) for d in fits.regression.drives]
 
 
 def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,

@@ -8,11 +8,10 @@ They compete with the effects of the catalogue in the same search and by the sam
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from scipy import fft
@@ -31,21 +30,9 @@ from pprs_dynamics.inference.search.patterns import (
 )
 
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
-FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
 # Limits of a range are moved by up to a bin, then by shares of it: a step in time is to be met to
 # the sample.
 LIMIT_STEPS = (1.0, 0.2, 0.04, 0.008)
-
-
-Shared = dict[Hashable, Any]
-"""Families of the platform and of other drives by name, made once for all drives."""
-
-
-def _once(shared: Shared, key: Hashable, make: Callable[[], Any]) -> Any:
-    """Return the result of `make`, called once for each key."""
-    if key not in shared:
-        shared[key] = make()
-    return shared[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +97,11 @@ class DrivePatterns:
     d : int
     with_plain_forms : bool
         Also what effects of the catalogue are exactly: a constant, friction, a ripple.
-    shared : Shared, optional
-        With libraries of other drives of the same residuals.
     """
 
     def __init__(self, regression: Regression, prior_costs: PriorCosts, d: int,
-                 with_plain_forms: bool = False, shared: Shared | None = None) -> None:
+                 with_plain_forms: bool = False) -> None:
         self.regression, self.prior_costs, self.d = regression, prior_costs, d
-        self._shared: Shared = {} if shared is None else shared
         self.series = regression.series[d]
         self.with_plain_forms = with_plain_forms
         residuals = regression.residuals
@@ -140,15 +124,11 @@ class DrivePatterns:
 
     @cached_property
     def _transformed(self) -> list[_Transformed]:
-        samples = hash(self.series.index.tobytes())
-
         def transformed(family: Family) -> _Transformed:
             rows = self.series.transform(family.columns.astype(np.float32, copy=False))
             return _Transformed(family, rows, self.series.products(rows, rows))
 
-        families = build_families(self.residuals, self.d, lambda name, make: _once(
-            self._shared, (samples, name), make))
-        return [_once(self._shared, family, partial(transformed, family)) for family in families
+        return [transformed(family) for family in build_families(self.residuals, self.d)
                 if self.with_plain_forms or not (family.paired or family.is_plain)]
 
     @cached_property
@@ -166,41 +146,17 @@ class DrivePatterns:
         return self.regression.transformed_block(
             {self.d: self.series.transform(family.columns.astype(float))})
 
-    def prior_cost(self, family: Family, drives: int = 1) -> CostTerms:
+    def prior_cost(self, family: Family) -> CostTerms:
         """Return the prior cost of a pattern of a family: that it is unknown, where, and which."""
         return self.prior_costs.of_pattern(max(len(self._transformed), 1) * family.alike,
-                                           max(len(family.patterns), 1), drives)
+                                           max(len(family.patterns), 1))
 
     def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
         """Return a pattern with its columns (1 or 2, M at the series' samples)."""
         full = np.zeros((len(rows), len(self.regression.residuals)))
         full[:, self.series.index] = rows
         block = self.regression.transformed_block({self.d: self.series.transform(rows)})
-        return UnknownCandidate(family, pattern, {self.d: full}, {self.d: block},
-                                self.prior_cost(family))
-
-    def on_more_drives(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
-        """Return the candidate on all drives on which it pays, if all share its variable."""
-        residuals = self.regression.residuals
-        shared = candidate.family.variable in ('time', 'frequency') or (
-            residuals.variables.get(candidate.family.variable, np.zeros((0, 0))).ndim == 1)
-        if not shared or candidate.pattern.kind.startswith('directed'):
-            return candidate
-        rows, parts, gains = dict(candidate.rows), dict(candidate.parts), {}
-        for d in self.regression.drives:
-            if d not in parts:
-                block = self.regression.block({d: candidate.rows[self.d]})
-                gains[d] = block, self.regression.gain(fit, block)
-        for d in sorted(gains, key=lambda d: -gains[d][1]):
-            block, gain = gains[d]
-            more = self.prior_cost(candidate.family, len(parts) + 1) - self.prior_cost(
-                candidate.family, len(parts))
-            if gain > more.total:
-                rows[d], parts[d] = candidate.rows[self.d], block
-        order = sorted(parts)
-        return UnknownCandidate(candidate.family, candidate.pattern, {d: rows[d] for d in order},
-                                {d: parts[d] for d in order},
-                                self.prior_cost(candidate.family, len(parts)))
+        return UnknownCandidate(family, pattern, self.d, full, block, self.prior_cost(family))
 
     def proposals(self, fit: JointFit, count: int, always: bool = False,
                   ) -> list[tuple[UnknownCandidate, float]]:
@@ -229,7 +185,7 @@ class DrivePatterns:
                  if rank < count or (always and family.is_plain)]
         line = self.line(fit)
         if line is not None:
-            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.terms.total))
+            found.append((line, self.regression.gain(fit, line.block) - line.terms.total))
         return sorted(found, key=lambda scored: -scored[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:
@@ -270,8 +226,6 @@ class DrivePatterns:
             Without the candidate.
         """
         pattern, family = candidate.pattern, candidate.family
-        if pattern.kind == 'line':
-            return self._line_refined(candidate, fit)
         if pattern.kind not in ('range', 'directed_range') or pattern.limits is None:
             return candidate
         speed = family.variable.startswith('velocity') and pattern.kind == 'directed_range'
@@ -304,22 +258,6 @@ class DrivePatterns:
         rows = np.asarray((values >= limits[0]) & (values <= limits[1]), dtype=float) * sign
         return self.candidate(family, moved, rows[None])
 
-    def _line_refined(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
-        """Return a line after Gauss-Newton steps in its frequency."""
-        frequency, time = candidate.pattern.scale, self.residuals.time
-        root = np.sqrt(self.series.spread(self.regression.weights(fit, self.d)))
-        rest = self.regression.remaining(fit, self.d) * root
-        middle = time - time.mean()
-        for _ in range(FREQUENCY_STEPS):
-            wave = _wave(frequency, time)
-            a, b = np.linalg.lstsq((self.series.transform(wave) * root).T, rest, rcond=None)[0]
-            slope = 2 * np.pi * middle * (b * wave[0] - a * wave[1])
-            rows = self.series.transform(np.concatenate((wave, slope[None]))) * root
-            step = np.linalg.lstsq(rows.T, rest, rcond=None)[0][2]
-            frequency += float(np.clip(step, -0.25 / np.ptp(time), 0.25 / np.ptp(time)))
-        return self.candidate(candidate.family, Pattern('line', scale=frequency),
-                              _wave(frequency, time))
-
     def values(self, variable: str) -> Array:
         """Return a variable by its name in the interface, also one of another drive, (n,)."""
         name, _, other = variable.partition(' of ')
@@ -341,5 +279,5 @@ def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
     found = [(candidate, gain, components) for components in libraries
              for candidate, gain in components.proposals(fit, count)]
     found.sort(key=lambda scored: -scored[1])
-    return [components.on_more_drives(components.refined(candidate, fit), fit)
+    return [components.refined(candidate, fit)
             for candidate, gain, components in found[:count] if gain > 0]
