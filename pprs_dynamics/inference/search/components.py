@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -98,14 +97,6 @@ class DriveComponents:
             parts.append(rows)
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
 
-    def around(self, regression: Regression) -> DriveComponents:
-        """Return these components around another operating point."""
-        found = copy(self)
-        found.regression, found.series = regression, regression.series[self.d]
-        if 'score_test' in vars(self):
-            found.score_test = self.score_test.around(regression)
-        return found
-
     def rows_of(self, effect: type[DriveEffect]) -> Array:
         """Return the transformed columns of an effect in all shapes tried, (k, n)."""
         if 'score_test' not in vars(self):  # which has variants and products as well
@@ -186,12 +177,6 @@ class Components:
         self._nuisance: dict[Component, Mapping[str, dict[int, Array]]] = {}
         self._prior_costs: dict[Component, CostTerms] = {}
         self.local = {d: DriveComponents(design, regression, d) for d in regression.drives}
-
-    def propose_as(self, other: Components) -> None:
-        """Take the rows of scans from another operating point, as they only propose."""
-        self.local = {d: other.local[d].around(self.regression) for d in self.local}
-        if 'score_test' in vars(other):
-            self.score_test = other.score_test.around(self.regression)
 
     @cached_property
     def structure(self) -> list[Component]:

@@ -32,7 +32,6 @@ from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
-from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -79,13 +78,8 @@ class FittedSets:
 
         See `Design.around`.
         """
-        found = FittedSets(self.design.around(point, alone), self.decisions,
-                           self.regression.error_scale)
-        # Behind another sensor of efforts every row looks otherwise.
-        if not any(issubclass(effect.effect, MeasurementEffect)
-                   and not effect.effect.shifts_positions() for effect in point.effects):
-            found.components.propose_as(self.components)
-        return found
+        return FittedSets(self.design.around(point, alone), self.decisions,
+                          self.regression.error_scale)
 
     @property
     def sets(self) -> tuple[CandidateSet, ...]:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -94,12 +93,6 @@ class ScoreTest(Generic[Label]):
     def rows(self) -> Mapping[int, Array]:
         """Rows of the tested columns."""
         return self._columns.rows
-
-    def around(self, regression: Regression) -> ScoreTest[Label]:
-        """Return the test around another operating point."""
-        found = copy(self)
-        found.regression, found._columns = regression, Columns(regression, self.rows)
-        return found
 
     def _group(self, entries: list[Entry[Label]]) -> _Group[Label]:
         places = np.array([entry.rows for entry in entries])

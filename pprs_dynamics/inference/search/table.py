@@ -274,9 +274,8 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
     if not search.is_ended or best.fitted.is_nonlinear or abs(
             first.evaluate(best.fitted.candidates).total - best.fitted.total) > LEAST_CHANGE:
         point = best.fits.design.point
-        patterns = search.patterns
         fits = first if point is None else first.around(point)
-        search = Search(fits, [pattern.around(fits.regression) for pattern in patterns],
+        search = Search(fits, search.patterns if fits is first else patterns_of(fits),
                         lambda share: report(0.6 + 0.3 * share))
         search.run(best.fitted.candidates)
         exact = _with_exact_costs(search, first, exact)

@@ -9,7 +9,6 @@ They compete with the effects of the catalogue in the same search and by the sam
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -111,16 +110,6 @@ class DrivePatterns:
             residuals.measured[index], residuals.model[index], {},
             {name: values[index] for name, values in residuals.variables.items()},
             residuals.period, residuals.units)
-
-    def around(self, regression: Regression) -> DrivePatterns:
-        """Return the patterns around another operating point."""
-        series = regression.series[self.d]
-        if not np.array_equal(series.index, self.series.index):
-            return DrivePatterns(regression, self.prior_costs, self.d, self.with_plain_forms)
-        found = copy(self)
-        found.regression, found.series = regression, series
-        vars(found).pop('_columns', None)
-        return found
 
     @cached_property
     def _transformed(self) -> list[_Transformed]:
