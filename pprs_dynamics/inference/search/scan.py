@@ -43,7 +43,7 @@ class Scan:
         self.fits = fits
 
     def proposals(self, base: CandidateSet, count: int | None = None, least: float = PROPOSED,
-                  drive: int | None = None) -> list[Candidates]:
+                  ) -> list[Candidates]:
         """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
 
         Parameters
@@ -53,11 +53,9 @@ class Scan:
             At most; by default all.
         least : float
             By which the cost must fall at the set's noise.
-        drive : int, optional
-            The only one on which something is added; by default any, and the structure.
         """
         scored: list[tuple[float, Candidates]] = []
-        for effect, found in self.offers(base, drive).items():
+        for effect, found in self.offers(base).items():
             old = next((c for c in base.effects if c.effect is effect), None)
             # A body on another link is another explanation where all are asked for.
             is_each = count is None and effect.is_of_one_place
@@ -70,18 +68,16 @@ class Scan:
         scored.sort(key=lambda scored: -scored[0])
         return [candidates for _, candidates in scored[:count]]
 
-    def offers(self, base: CandidateSet, drive: int | None = None,
-               ) -> dict[type[CatalogueEffect], list[Scored]]:
+    def offers(self, base: CandidateSet) -> dict[type[CatalogueEffect], list[Scored]]:
         """Return gains less prior costs of components, by effect; one for each drive or place."""
         components, fit = self.fits.components, base.fit
         taken = {(component.effect, component.drive) for component in base.blocks}
 
         offers: list[tuple[Component, float]] = []
-        for d in components.local if drive is None else (drive,):
-            offers += components.local[d].offers(fit).values()
+        for local in components.local.values():
+            offers += local.offers(fit).values()
             self.fits.stepped()
-        if drive is None:
-            offers += components.shared_offers(fit)
+        offers += components.shared_offers(fit)
         best: dict[Hashable, Scored] = {}
         for component, gain in offers:
             place = (component.effect, component.drive)

@@ -22,7 +22,6 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
     UnknownCandidate,
-    joined,
 )
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
@@ -188,21 +187,15 @@ class Search:
         for candidate in best.effects:
             for component in candidate.components if candidate.effect.shape else ():
                 yield from self._reshaped(best, candidate, component)
-            if len(candidate.components) > 1:
-                yield from self._divided(best, candidate)
 
     def _with_others(self, best: CandidateSet) -> Iterator[Candidates]:
-        """Yield sets in which another effect replaces one or two candidates, or one on a drive."""
+        """Yield sets in which another effect replaces one or two candidates."""
         for candidate in best.candidates:
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             yield from self._instead(best, best.without(candidate), None)
         for pair in combinations(best.candidates, 2):
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
-        # Two effects on one drive may be one there, and something else on other drives.
-        for a, b in combinations(best.blocks, 2):
-            if a.drive == b.drive is not None:
-                yield from self._instead(best, reduced(best, a, b), REPLACEMENTS, a.drive)
 
     def _reshaped(self, best: CandidateSet, candidate: EffectCandidate, component: Component,
                   ) -> Iterator[Candidates]:
@@ -213,28 +206,11 @@ class Search:
                     base.fit, component, REPLACEMENTS):
                 yield exchanged(best, candidate, with_instead(candidate, component, other))
 
-    def _divided(self, best: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
-        """Yield a set with other effects on one drive of an effect, and on all of its drives.
-
-        One flexible effect on two drives costs less than two effects until both are replaced.
-        """
-        divided = best.without(candidate)
-        for component in candidate.components:
-            rest = reduced(best, component)
-            found = self._instead(best, rest, REPLACEMENTS, component.drive)
-            yield from found
-            known = {component for c in rest for component in c.components}
-            new = [other for c in found[0] for other in c.components if other not in known
-                   ] if found else [component]
-            divided = joined(divided, new)
-        yield divided
-
     def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
-                 drive: int | None = None) -> list[Candidates]:
+                 ) -> list[Candidates]:
         """Return a part of a set with an effect that makes good most of what it lacks."""
         base = self.fits.at_noise_of(best, rest)
-        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED,
-                                   drive)
+        return self.scan.proposals(base, count, RECOVERED * (base.total - best.total) - REPLACED)
 
 
 def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
