@@ -56,7 +56,6 @@ NOISE_STEPS = 2  # of the noise in a round
 MOST_BEYOND, MOST_BACK = 2.0, 0.6  # of the last round's change of the noise, when it is accelerated
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 8000  # products of blocks on a drive, both ways, that are kept: some 10 kB each
-MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +136,6 @@ class Regression:
         self.base_products = {d: self.series[d].products(rows, rows)
                               for d, rows in self.base.items()}
         self._products: dict[tuple[Block, Block | None, int], Array] = {}
-        self._equations: dict[tuple[int, tuple[Block, ...]], DriveEquations] = {}
         self.error_scale = error_scale or {
             d: root_mean_square(rows[-1]) for d, rows in self.base.items()}
 
@@ -237,14 +235,8 @@ class Regression:
                 for b in (None, *blocks[:k + 1])}
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
-        """Return the equations of a drive, kept: sets that follow each other differ on few."""
-        key = (d, acting)
-        found = self._equations.pop(key, None) or DriveEquations(
-            self.base_products[d], acting, self.products(acting, d))
-        if len(self._equations) >= MOST_EQUATIONS:
-            self._equations.pop(next(iter(self._equations)))  # not used for longest
-        self._equations[key] = found
-        return found
+        """Return the equations of a drive and the blocks that act on it."""
+        return DriveEquations(self.base_products[d], acting, self.products(acting, d))
 
     def system(self, blocks: Sequence[Block]) -> NormalEquations:
         """Return the normal equations of blocks and the base columns."""
