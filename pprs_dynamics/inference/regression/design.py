@@ -77,7 +77,6 @@ from pprs_dynamics.physics.model.parameter_values import effect_uncertainties
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
-MOST_EXACT = 8  # models whose forces are known
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
@@ -130,7 +129,6 @@ class Design:
     columns: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _moved: dict[tuple[Any, ...], tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
-    _exact: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Mapping[int, Array]] = field(
         default_factory=dict, repr=False, compare=False)
 
@@ -203,7 +201,7 @@ class Design:
             for d, row in design.known_change(term).items():
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
-        return replace(design, residuals=residuals, point=point, _exact=self._exact)
+        return replace(design, residuals=residuals, point=point)
 
     def _unmoved(self, point: OperatingPoint) -> dict[str, Array]:
         """Return the columns that are not computed again around another operating point.
@@ -266,13 +264,8 @@ class Design:
         PprsError
             Where the model cannot follow them.
         """
-        key = repr(model.values)
-        if key not in self._exact:
-            if len(self._exact) >= MOST_EXACT:
-                self._exact.pop(next(iter(self._exact)))
-            self._exact[key] = np.concatenate([treated_forces(model, table)['total']
-                                               for table in self.reconstructed(model)])
-        return self._exact[key]
+        return np.concatenate([treated_forces(model, table)['total']
+                               for table in self.reconstructed(model)])
 
     def carried_forces(self, coefficients: Array) -> Array:
         """Return the force of a reference's directions with coefficients, (M, D) [N].
