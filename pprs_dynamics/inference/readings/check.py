@@ -163,15 +163,10 @@ class Search:
         self.rows = readings(model.drives, model.units, self._loads(), times,
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
-        # may be any, the more so where no name says that a column is an effort.
-        is_unnamed = model.recorded.columns is not None and any(
-            isinstance(drive.names.get('effort'), int)
-            for drive in model.recorded.columns.drives.values())
-        self.cost_of_constants = table.COST['drive_constant'] - (
-            table.UNNAMED if is_unnamed else table.UNCHECKED if is_first else 0.0)
+        # may be any.
+        self.cost_of_constants = table.COST['drive_constant'] - table.UNCHECKED * is_first
         self.is_first = is_first
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
-        self.plausible = min(table.PLAUSIBLE, (self.same_masses / table.MASSES) ** 2)
         self.has_gain = knows_forces(model)  # without it masses and units are no evidence
         self.masses = table.MASSES if self.has_gain else np.inf
         # Recorded velocities over the derivatives of positions.
@@ -222,13 +217,10 @@ class Search:
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
         self.fits = self.fits_of(first) or [Fit(first)]
         self.start = start = self._top()
-        is_inside = not self._outside(first)
         # Without masses a gravity of any size may explain positions in another unit.
-        explains = is_inside and start.reading.is_plain and self.has_gain and (
-            start.prior < self.plausible)
+        explains = start.reading.is_plain and self.has_gain and start.prior < table.PLAUSIBLE
         # Hardly anything may be explained better.
-        if explains and start.largest_residual < (
-                table.CLOSEST_FIT if self.is_first else table.CLOSE_FIT):
+        if explains and start.largest_residual < table.CLOSE_FIT:
             return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
         tried = {'position_unit', 'drive_order'} if explains and (

@@ -70,8 +70,7 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
-# Less, of amperes in columns without names, and where nobody has checked the unit.
-UNNAMED, UNCHECKED = 6.0, 5.0
+UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
@@ -82,8 +81,7 @@ STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
 BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the given one
-# Residual of every drive with which no other reading is tried, and where nobody has checked units.
-CLOSE_FIT, CLOSEST_FIT = 2e-3, 6e-4
+CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
 RESTING = 0.01  # [rad/s, m/s] speed from which a drive moves, however wide friction turns over
