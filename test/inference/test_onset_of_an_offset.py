@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""An offset that begins within a recording is dated, whenever it begins."""
+"""An offset that begins within a recording is dated, and what has a place is no event."""
 
 from __future__ import annotations
 
@@ -36,3 +36,14 @@ def test_an_offset_that_begins_is_no_friction_with_more_coefficients() -> None:
     late = replace(run, effort=run.effort + 6.0 * (run.time > 5.5)[:, None])
     effect, = diagnose(axis(), [late]).effects
     assert (effect.name, effect.when) == ('effort_offset', ' since 5.5 s')
+
+
+def test_friction_that_depends_on_the_position_is_no_passing_event() -> None:
+    """At 0.12 m the axis is three times, for 0.3 s each: the error looked like contacts then."""
+    run = axis_recording(axis(), seed=4)
+    sign = np.tanh(np.gradient(run.position, run.time, axis=0) / 0.001)
+    dirt = 3.0 * np.exp(-((run.position - 0.12) / 0.02) ** 2) * sign
+    found = diagnose(axis(), [replace(run, effort=run.effort + dirt)])
+    assert found.verdict == 'unknown'
+    assert {statement.variable for statement in found.depends_on} == {'position'}
+    assert not any(effect.course for effect in found.effects)

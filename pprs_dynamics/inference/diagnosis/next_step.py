@@ -194,6 +194,7 @@ def _curve(diagnosis: Diagnosis) -> str | None:
     """Return the request of `adopt` for a curve over what no effect explains; None for none."""
     for statement in diagnosis.depends_on:
         name, _, other = statement.variable.partition(' of ')
-        if name in (OF if other else OWN):
+        # Such a curve has no direction of motion.
+        if name in (OF if other else OWN) and not statement.kind.startswith('directed'):
             return f'{MeasuredCurve.name}:{statement.drive}@{statement.variable}'
     return None

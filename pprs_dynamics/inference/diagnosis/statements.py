@@ -20,7 +20,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_sign,
 )
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
-from pprs_dynamics.inference.search.patterns import Pattern
+from pprs_dynamics.inference.search.patterns import CURVE, Pattern
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.json_records import JsonRecord
 
@@ -179,6 +179,9 @@ def _sentence(
         factor, place = read_in('position', units)
         return (f'its error repeats every {plain(pattern.scale * factor)} {place} of position, '
                 f'{size} {effort} ({of})')
+    if kind == CURVE:
+        return ('its error depends on position in the direction of motion, '
+                f'{plain(float(np.std(shape)), SHOWN)} {effort} rms ({of})')
     if kind == 'line':
         return f'its error vibrates at {plain(pattern.scale, 4)} Hz, {size} {effort} ({of})'
     if kind in ('growth', 'directed_growth'):

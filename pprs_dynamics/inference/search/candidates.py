@@ -20,7 +20,7 @@ from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.patterns import Family, Pattern
+from pprs_dynamics.inference.search.patterns import CURVE, Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
@@ -375,7 +375,8 @@ class CandidateSet:
     def row_key(self) -> RowKey:
         """Names of the candidates, whatever their drives and shapes."""
         return frozenset((candidate.placed_name, candidate.course.kind if candidate.course else '')
-                         if isinstance(candidate, EffectCandidate) else (candidate.name, '')
+                         if isinstance(candidate, EffectCandidate)
+                         else (candidate.name, CURVE * (candidate.pattern.kind == CURVE))
                          for candidate in self.candidates)
 
     @property

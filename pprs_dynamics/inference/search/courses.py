@@ -21,12 +21,15 @@ from pprs_dynamics.inference.search.candidates import (
     DRIFT,
     DURING,
     SINCE,
+    Candidate,
     Candidates,
     CandidateSet,
     Course,
     EffectCandidate,
+    UnknownCandidate,
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
+from pprs_dynamics.inference.search.patterns import CURVE, Family, Pattern, directed_curve
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 
 # Onsets that are tried, and stretches: so many parts of the recordings, each of so many of them
@@ -105,6 +108,48 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
                 other for other in effects if not changing.isdisjoint(other.drives or changing))):
             fits.pruned(fits.evaluate(_refined(fits, fitted).candidates))
     return bool(drives)
+
+
+def fit_curves(first: FittedSets, last: FittedSets, best: CandidateSet) -> bool:
+    """Fit friction that depends on the position in any way, where an event is in the best set.
+
+    What returns at the same place, in the same direction, is no event. Only there are such curves
+    tried: they imitate any friction. Return whether any was.
+
+    Parameters
+    ----------
+    first, last : FittedSets
+        Around the input model, for sets without a nonlinear effect, and around the last model.
+    best : CandidateSet
+    """
+    drives = sorted({d for candidate in best.candidates if _is_event(candidate)
+                     for d in candidate.drives or last.regression.drives})
+    for effects in dict.fromkeys((best.effects, tuple(
+            effect for effect in best.effects if not effect.course), ())) if drives else ():
+        base = last.evaluate(effects)
+        fits = last if base.is_nonlinear else first
+        base = fits.evaluate(effects)
+        for d in drives:
+            if (curve := _curve(fits, d)) is not None:
+                base = min(base, fits.evaluate((*base.candidates, curve)),
+                           key=lambda found: found.total)
+    return bool(drives)
+
+
+def _is_event(candidate: Candidate) -> bool:
+    return (candidate.family.variable == 'time' if isinstance(candidate, UnknownCandidate)
+            else candidate.course is not None)
+
+
+def _curve(fits: FittedSets, d: int) -> UnknownCandidate | None:
+    """Return friction of a drive that is any smooth function of its position."""
+    if (curve := directed_curve(fits.design.residuals, d)) is None:
+        return None
+    rows, precision = curve
+    regression, pattern = fits.regression, Pattern(CURVE)
+    block = regression.block({d: rows}, np.diag(precision) / regression.error_scale[d] ** 2)
+    return UnknownCandidate(Family('position', rows, np.zeros((0, 0)), (pattern,)), pattern, d,
+                            rows, block, fits.prior_costs.of_pattern(1, 1))
 
 
 def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:

@@ -31,6 +31,10 @@ SLOW_SHARES = (0.03, 0.06, 0.12, 0.2, 0.35, 0.55, 0.8)
 # Friction turns over at a reversal within a speed that is seldom known: shares of the highest.
 REVERSAL_WIDTHS = (0.0015, 0.005, 0.015)
 RIPPLE_PERIODS = (2, 32)  # periods of a force ripple within the drive's travel
+# Cosines of a curve, the shortest with 16 periods within the travel, and the periods from which on
+# the prior expects less of them: a curve is smooth.
+CURVE, CURVE_TERMS, SMOOTH_PERIODS = 'directed_curve', 33, 2.0
+CURVE_WIDTHS = (*REVERSAL_WIDTHS, 0.05)
 # Widths of smooth bumps, as parts of the stroke, and their standard deviation in widths.
 BUMP_PARTS = (4, 8, 16, 32)
 BUMP_DEVIATION = 0.4
@@ -47,7 +51,7 @@ class Pattern(NamedTuple):
     ----------
     kind : str
         'offset', 'range', 'bump', 'directed_range', 'growth', 'directed_growth', 'one_way',
-        'friction', 'fading', 'fast', 'ripple' or 'line'.
+        'friction', 'fading', 'fast', 'ripple', 'line' or 'directed_curve'.
     limits : (float, float) or None
         Of the variable, where the pattern is confined to them.
     scale : float
@@ -148,15 +152,34 @@ def _offset(samples: int) -> Family:
 
 
 def _direction(sign: Array, velocity: Array | None) -> Family:
-    signs = [sign]
-    if velocity is not None:
-        signs += [_turned(velocity, width) for width in REVERSAL_WIDTHS]
     columns, patterns = [], []
-    for turned in signs:
+    for turned in _turning(sign, velocity):
         columns += [(turned + 1) / 2, (1 - turned) / 2, turned]
         patterns += [Pattern('one_way', (0.0, 1.0)), Pattern('one_way', (-1.0, 0.0)),
                      Pattern('friction')]
     return Family('direction', np.stack(columns), np.eye(len(columns)), tuple(patterns))
+
+
+def _turning(sign: Array, velocity: Array | None,
+             widths: tuple[float, ...] = REVERSAL_WIDTHS) -> list[Array]:
+    """Return the direction of motion, also as it turns over within several speeds."""
+    return [sign] + [_turned(velocity, width) for width in widths if velocity is not None]
+
+
+def directed_curve(residuals: Residuals, drive: int) -> tuple[Array, Array] | None:
+    """Return friction that is any smooth function of the position, however it turns over.
+
+    As rows (k, M), and the precision of their coefficients (k,) for a curve of about 1. None of a
+    drive that does not move both ways.
+    """
+    position, direction = (residuals.variable(name, drive) for name in ('position', 'direction'))
+    if position is None or direction is None or np.ptp(direction) < 0.5:
+        return None
+    k = np.arange(CURVE_TERMS)
+    waves = np.cos(np.pi * k[:, None] * (position - position.min()) / np.ptp(position))
+    turning = _turning(direction, residuals.variable('velocity', drive), CURVE_WIDTHS)
+    return np.concatenate([turned * waves for turned in turning]), np.tile(
+        0.5 * (1 + (k / (2 * SMOOTH_PERIODS)) ** 2) ** 2, len(turning))
 
 
 def _turned(velocity: Array, width: float) -> Array:

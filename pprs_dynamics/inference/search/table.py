@@ -24,7 +24,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     RowKey,
 )
-from pprs_dynamics.inference.search.courses import fit_courses
+from pprs_dynamics.inference.search.courses import fit_courses, fit_curves
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import (
     fitted_model,
@@ -282,8 +282,11 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
     table = with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
     fit_courses(table.last, table.reported, list(table.alone.values()),
                 None if first is search.fits else first)
+    table = with_exact_best(table)
+    if fit_curves(first, table.last, table.best.fitted):
+        table = with_exact_best(table)
     report(1.0)
-    return with_exact_best(table)
+    return table
 
 
 def input_model_alone(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
