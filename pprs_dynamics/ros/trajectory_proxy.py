@@ -244,7 +244,7 @@ class TrajectoryProxyNode(Node):
         # Drives' positions: the platform's motion follows from them.
         drives: Any = request.motion
         motion = model.robot.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
-        return TrajectoryRequest(motion, request.start, request.offsets)
+        return TrajectoryRequest(motion.with_time(drives.time), request.start, request.offsets)
 
 
 def _duration(goal: Any, now: int) -> float:

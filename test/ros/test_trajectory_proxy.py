@@ -15,6 +15,7 @@ import pytest
 from action_msgs.msg import GoalStatus
 from control_msgs_stand_in import FollowJointTrajectory, install
 from controller_rules import ControllerSettings, objection
+from model_recordings import with_effects
 from node_bench import Bench, bench, overrides
 from rclpy.action import GoalResponse
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -125,6 +126,14 @@ def test_a_goal_reaches_the_controller_with_its_efforts(cell: Cell) -> None:
     assert np.abs(efforts[-1] - PATH.total[-1]).max() > 0.1
     assert list(taken.points[-1].positions) == list(taken.points[-2].positions)
     assert objection(taken, ControllerSettings(DRIVES), 0) == ''
+
+
+def test_effects_with_memory_act_along_a_goal_of_drives(cell: Cell) -> None:
+    warming = with_effects(MODEL, {'friction_drift': {'slide_1.force': 5.0, 'slide_1.time': 0.5}})
+    wanted = warming.drive_forces(HelicalPath().motion(ALONG)).total
+    asked = cell.node._request(warming, goal(ALONG, *PATH.drive_motion))
+    np.testing.assert_allclose(warming.drive_forces(asked.motion).total, wanted, atol=1e-6)
+    assert np.abs(wanted - PATH.total).max() > 1.0
 
 
 def test_a_goal_that_breaks_a_rule_is_refused_when_it_is_asked(cell: Cell) -> None:
