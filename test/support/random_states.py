@@ -64,10 +64,10 @@ def inverse_kinematics(geometry: Geometry, motion: PlatformMotion) -> ClosedForm
 
 def masses_of(robot: ThreePprs) -> Masses:
     """Return the masses of a robot, those of its payload with those of the platform."""
-    mass, centre, I = about_centre(robot.inertial[-1])  # noqa: E741
+    mass, centre, inertia = about_centre(robot.inertial[-1])
     slides, lifts, rods = robot.masses[:-1].reshape(3, 3).tolist()
     return Masses(mass, 0.0, tuple(slides), tuple(lifts), tuple(rods), tuple(centre.tolist()),
-                  tuple(map(float, (*np.diag(I), I[0, 1], I[0, 2], I[1, 2]))))
+                  tuple(map(float, (*np.diag(inertia), *inertia[np.triu_indices(3, 1)]))))
 
 
 def paper_geometry(elbow: str = 'up') -> Geometry:

@@ -218,17 +218,16 @@ def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     return [DrivePatterns(fits.regression, fits.prior_costs, d) for d in fits.regression.drives]
 
 
-def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,
+def with_instead(candidate: EffectCandidate, gone: Component, instead: Component,
                  ) -> EffectCandidate:
-    """Return the candidate with something else, or nothing, for one of its components."""
+    """Return the candidate with another component for one of its own."""
     return EffectCandidate.of([*(component for component in candidate.components
-                                 if component is not gone),
-                               *instead])
+                                 if component is not gone), instead])
 
 
-def reduced(fitted: CandidateSet, *gone: Component) -> Candidates:
-    """Return the candidates of a set without some components."""
-    kept = (tuple(component for component in c.components if component not in gone)
+def reduced(fitted: CandidateSet, gone: Component) -> Candidates:
+    """Return the candidates of a set without a component."""
+    kept = (tuple(component for component in c.components if component != gone)
             if isinstance(c, EffectCandidate) else () for c in fitted.candidates)
     return tuple(EffectCandidate.of(components) if components else c
                  for c, components in zip(fitted.candidates, kept, strict=True)

@@ -457,7 +457,7 @@ class ThreePprs(Mechanism):
             Without it the drives have no friction.
         """
         geometry, bounds = self.geometry, self.bounds
-        mass, centre, I = about_centre(self.inertial[-1])  # noqa: E741
+        mass, centre, inertia = about_centre(self.inertial[-1])
         friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
             closed_form.DriveParameters(*drive)
             for drive in drives[[tree.VISCOUS, tree.COEFFICIENT, tree.WIDTH]].T.tolist())
@@ -465,7 +465,8 @@ class ThreePprs(Mechanism):
         return row_of(closed_form.Parameters(
             geometry.base_radius, geometry.rod_length, geometry.platform_radius,
             geometry.elbow_sign, (first, second, third), mass, Vector(*centre),
-            Vector(*np.diag(I)), Vector(I[0, 1], I[0, 2], I[1, 2]), Vector(*self.gravity),
+            Vector(*np.diag(inertia)), Vector(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
+            Vector(*self.gravity),
             float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
 
     def one_pass(self, motion: Any, parameters: Any, closed: object, has_state: bool = False,
