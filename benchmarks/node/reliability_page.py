@@ -49,8 +49,8 @@ def _stall(found: dict[str, Any]) -> str:
             for what, of in (('stamped', found['stamped']), ('stamp 0', found['unstamped']))]
     return ('\n'.join((
         f'Stopped (SIGSTOP) for {found["stopped_s"]:g} s in a stream of {found["rate"]:g} Hz of a '
-        'platform that rises at 15 mm/s, and continued. Commands of the 0.3 s after that:', '',
-        '| messages | sent | commands | setpoints older than 0.1 s | oldest setpoint | '
+        'platform that rises at 15 mm/s, and continued. Commands of the 2 s after that:', '',
+        '| messages | sent | commands | sent over 0.1 s before it went on | oldest before it | '
         'farthest from the path | rejected, `TIME` | passed over for later ones |',
         '|---|---|---|---|---|---|---|---|', *rows, '')) + '\nUntil the first command the drives '
         'remain at the pose of the stop, with its gravity.\n')
