@@ -38,7 +38,6 @@ if TYPE_CHECKING:
         UnreadableFileError,
         WorkspaceError,
     )
-    from pprs_dynamics.inference.experiments.motion_design import MotionLimits
     from pprs_dynamics.measurement.files.recording import (
         Recording,
         read_recording,
@@ -63,7 +62,7 @@ __all__ = ['AdoptionResult', 'AdoptionRunResult', 'Array', 'CatalogueEffect',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
            'FitResult', 'Forces', 'HelicalPath', 'JointMotion', 'LimitError',
            'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
-           'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
+           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
            'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
            'UnreadableFileError', 'WorkspaceError', 'adopt', 'adopt_all', 'compare', 'diagnose',
            'fit', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
@@ -83,7 +82,6 @@ _HOMES = {
         'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
         'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
         'WorkspaceError'),
-    'inference.experiments.motion_design': ('MotionLimits',),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
         'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),

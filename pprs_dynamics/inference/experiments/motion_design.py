@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.joint_friction import IndependentChainsFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -73,13 +73,6 @@ class MotionLimits:
     condition_number: float = 8.0
     margin: float = 0.1
     effort_reserve: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ('velocity', 'acceleration', 'tilt', 'condition_number'):
-            if getattr(self, name) is not None and not getattr(self, name) > 0:
-                raise ModelError(name, getattr(self, name), 'be greater than 0')
-        if not 0 <= self.margin <= 0.9:
-            raise ModelError('margin', self.margin, 'lie between 0 and 0.9')
 
     def middle(self, model: DriveModel) -> Array:
         """Return the coordinates about which a robot moves.

@@ -13,20 +13,16 @@ import numpy as np
 from scipy.special import ndtr
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, design
 from pprs_dynamics.inference.experiments.question import (
     COMMISSION,
     ESTIMATE,
     SEPARATE,
-    FittedTerm,
     Question,
     commissioning,
-    precision_of,
     question_of,
 )
-from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -117,9 +113,6 @@ class Experiment(JsonRecord):
     motion : callable
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     model : DriveModel
-    determined, total : int, optional
-        Of a first motion: how many combinations of the model's numbers it determines better than
-        the size at which they matter, and all of them.
     """
 
     json_keys = ('separates', 'does_not_separate', 'expected_evidence', 'load',
@@ -136,8 +129,6 @@ class Experiment(JsonRecord):
     duration: float
     motion: Callable[[Array], PlatformMotion | JointMotion]
     model: DriveModel = field(repr=False)
-    determined: int | None = None
-    total: int | None = None
 
     def forces(self, time: Array) -> Forces:
         """Return the model's forces along the motion at times [s]."""
@@ -182,12 +173,22 @@ class Experiment(JsonRecord):
         return float(f'{LOAD_SHARE * mass:.1g}') if self.separated_by_load else None
 
     @property
+    def total(self) -> int | None:
+        """How many numbers a first motion is for; null for other motions."""
+        return len(self.accuracies) if self.kind == COMMISSION else None
+
+    @property
+    def determined(self) -> int | None:
+        """How many of them it determines better than the size at which they matter."""
+        return self.total and sum(a.std_after < a.scale for a in self.accuracies)
+
+    @property
     def text(self) -> str:
         """Purpose and expected evidence, in a few sentences."""
         if self.determined is not None:
             return ('This motion measures the numbers of the model and of common effects. It '
-                    f'determines {self.determined} of {self.total} combinations better '
-                    'than the size at which they matter. Collisions are not checked.')
+                    f'determines {self.determined} of {self.total} better than the size at which '
+                    'they matter. Collisions are not checked.')
         if self.kind == ESTIMATE:
             return (f'Only one explanation remains: {", ".join(self.subjects)}. This motion '
                     'measures its parameters best.')
@@ -215,8 +216,7 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 def next_experiment(
     model: DriveModel, recordings: Sequence[Recording] = (), purpose: str = SEPARATE,
-    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
-    noise: float | None = None, progress: Callable[[float], None] | None = None,
+    duration: float = 20.0, seed: int = 0, progress: Callable[[float], None] | None = None,
 ) -> Experiment:
     """Return the motion that decides most; see `pprs_dynamics.next_experiment`.
 
@@ -232,34 +232,23 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    limits = limits or MotionLimits()
-    motions = Motions(model, limits, duration)
-    question = (commissioning(model, recordings, motions, noise) if purpose == COMMISSION else
+    motions = Motions(model, MotionLimits(), duration)
+    question = (commissioning(model, recordings, motions) if purpose == COMMISSION else
                 question_of(model, recordings, motions, lambda share: report(0.2 * share)))
-    motions = replace(motions, limits=replace(limits, effort_reserve=max(
-        limits.effort_reserve, RESERVE * question.noise_floor)))
+    motions = replace(motions, limits=MotionLimits(effort_reserve=RESERVE * question.noise_floor))
     return design_experiment(question, motions, seed, lambda share: report(0.2 + 0.8 * share))
 
 
 def design_experiment(question: Question, motions: Motions, seed: int,
                       progress: Callable[[float], None] = lambda share: None) -> Experiment:
     """Return the motion that answers a question best."""
-    drawn = motions.drawn(seed)
-    if question.contests:
-        question = question.without_hopeless([question.gram(motions, series) for series in drawn])
-    best = design(motions, drawn, lambda series: question.worth(question.gram(motions, series)),
-                  seed, progress)
+    best = design(motions, motions.drawn(seed),
+                  lambda series: question.worth(question.gram(motions, series)), seed, progress)
     after = question.known + question.gram(motions, best)
-    determined: tuple[int, ...] = ()
-    if question.kind == COMMISSION:
-        gains = np.linalg.eigvalsh(question.precision.own(after))
-        determined = int(np.sum(gains > 1)), len(gains)
     return Experiment(
-        question.kind, tuple(dict.fromkeys(
-            term.component.effect.name for terms in question.subjects for term in terms)),
-        _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
-        best.duration, lambda time: motions.sampled(best, time), question.information.model,
-        *determined)
+        question.kind, question.subjects, _expected(question, after), _accuracies(question, after),
+        motions.uses(best), best.duration, lambda time: motions.sampled(best, time),
+        question.information.model)
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
@@ -292,35 +281,12 @@ def _expected(question: Question, after: Array) -> tuple[ExpectedEvidence, ...]:
     return tuple(found)
 
 
-def _accuracies(question: Question, after: Array) -> list[Accuracy]:
-    """Return how well numbers and effects would be known; of common effects each alone."""
-    if question.contests:
-        return []
-    information, groups = question.information, list(question.subjects)
-    if question.kind == ESTIMATE:
-        groups = [tuple(term for terms in groups for term in terms)]
-    asked = [([label for term in terms for label in _labels(term, information.model)],
-              precision_of(information, terms)) for terms in groups]
-    if question.kind == COMMISSION:
-        # Columns of the model's numbers are per standard deviation of what is known beforehand.
-        asked.insert(0, ([(column.label, column.unit, column.deviation) for column in (
-            base.number for base in information.base if isinstance(base, ModelNumber))],
-            precision_of(information, (), information.numbers)))
+def _accuracies(question: Question, after: Array) -> tuple[Accuracy, ...]:
+    """Return how well numbers would be known; infinite deviations of what nothing shows."""
     found = []
-    for labels, precision in asked:
-        before, later = (precision.deviations(gram) / precision.scales
-                         for gram in (question.known, after))
-        found += [Accuracy(label, unit, scale, scale * float(a), scale * float(b))
-                  for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
-    return found
-
-
-def _labels(term: FittedTerm, model: DriveModel) -> list[tuple[str, str, float]]:
-    """Return name, unit and scale of each parameter of a term that is fitted."""
-    shape, drive = term.component.parameters, term.component.drive
-    prefix, unit = term.component.effect.name, DriveUnits()
-    if drive is not None:
-        prefix, unit = f'{prefix}.{model.drives[drive]}', model.units[drive]
-    return [(f'{prefix}.{p.name}', unit.of(p.unit),
-             p.spread(1.0, shape[p.name]) if p.name in shape else p.scale)
-            for p in term.parameters]
+    for contest in question.contests if question.kind != SEPARATE else ():
+        with np.errstate(divide='ignore'):
+            before, later = (float(contest.scale / np.sqrt(contest.misfit(gram)))
+                             for gram in (question.known, after))
+        found.append(Accuracy(contest.truth[0], contest.unit, contest.scale, before, later))
+    return tuple(found)

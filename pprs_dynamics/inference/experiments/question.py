@@ -6,14 +6,16 @@
 A question is rival rows of the table, or numbers that are poorly known. Columns are those of
 `regression.design`, so that the information of a motion and that of the recordings add up. As in a
 fit they are transformed by the orthonormal DCT and divided by the root of the noise's power
-spectrum. Criteria are the expected evidence between rival models, and D-optimality of numbers.
+spectrum. The one criterion is expected evidence: of rival models, or of a number at the size at
+which it matters against zero. The mean of 1 / (1 + evidence) is then the mean share of the numbers'
+variances that the data leave (A-optimality).
 
 References
 ----------
 A. C. Atkinson, V. V. Fedorov, The design of experiments for discriminating between two rival
 models, Biometrika 62 (1975) 57-70 (T-optimality).
 K. Chaloner, I. Verdinelli, Bayesian experimental design: a review, Statistical Science 10 (1995)
-273-304 (D-optimality with what is known beforehand).
+273-304 (A-optimality with what is known beforehand).
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from scipy import fft
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.experiments.motion_design import Motions, coarse_time
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
@@ -47,7 +50,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import BLOCK_DURATION
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
@@ -66,9 +69,7 @@ NUMBERS = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts',
 TYPICAL = DriveRange(20.0, BLOCK_DURATION, 0.2, 0.2)  # for shapes of effects
 SEPARATE, ESTIMATE, COMMISSION = 'separate', 'estimate', 'commission'
 WEAK = 1e-9  # prior precision of what is free, relative to what is known of it
-# A direction of less information, per scale, is unknown, and so is what has a share in it.
-UNSEEN, WEIGHT = 1e-8, 1e-4
-EVIDENCE_FLOOR = 1.0  # misfits below it count as none
+UNSEEN = 1e-8  # share of the squared force, below which a misfit is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,18 +94,19 @@ class FittedTerm:
         """Number of columns."""
         return len(self.values) + len(self.component.shape)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the fitted columns: coefficients, then shape parameters."""
-        effect, known = self.component.effect, self.component.effect.coefficients
-        return (*(c for name in self.component.names for c in known if c.name == name),
-                *effect.shape)
+    def labels(self, model: DriveModel) -> list[tuple[str, str, float, float]]:
+        """Return name, unit, scale and coefficient of that size of each parameter that is fitted.
 
-    @property
-    def scales(self) -> Array:
-        """Sizes at which the fitted coefficients matter; shapes by a factor of e."""
-        return np.array([p.scale for p in self.parameters[:len(self.component.names)]]
-                        + [1.0] * len(self.component.shape))
+        Coefficients, then shape parameters, of which the column is that of a factor of e.
+        """
+        effect, drive = self.component.effect, self.component.drive
+        shape, prefix, units = self.component.parameters, effect.name, DriveUnits()
+        if drive is not None:
+            prefix, units = f'{prefix}.{model.drives[drive]}', model.units[drive]
+        known = {c.name: c for c in effect.coefficients}
+        return [(f'{prefix}.{p.name}', units.of(p.unit), *(
+            (p.spread(1.0, shape[p.name]), 1.0) if p.name in shape else (p.scale, p.scale)))
+            for p in (*(known[name] for name in self.component.names), *effect.shape)]
 
     def rows(self, design: Design) -> Rows:
         """Return the columns of the term on recordings or on a motion."""
@@ -154,11 +156,6 @@ class Information:
     def size(self) -> int:
         """Number of all columns."""
         return len(self.base) + sum(term.size for term in self.terms)
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Places of the model's own numbers."""
-        return tuple(k for k, column in enumerate(self.base) if isinstance(column, ModelNumber))
 
     def places(self, terms: Sequence[FittedTerm], only_fitted: bool = True) -> tuple[int, ...]:
         """Return the places of the columns of terms that are fitted, or of their coefficients."""
@@ -253,72 +250,40 @@ class Contest:
 
     Parameters
     ----------
-    truth, rival : tuple of str
-        Effects that only the truth has, and those that only the rival has.
     missing : (P,) array
         Coefficients of the true force, less what the rival has for certain.
     refitted : tuple of int
         Places of all columns that are fitted with the rival.
+    truth, rival : tuple of str
+        Effects that only the truth has, and those that only the rival has. For a number its label,
+        and none: the rival is the model without it.
     now : float
         By how much the rival costs more on the recordings that there are.
+    unit : str
+        Of a number.
+    scale : float
+        Size at which a number matters; that of `missing`.
     """
 
-    truth: tuple[str, ...]
-    rival: tuple[str, ...]
     missing: Array
     refitted: tuple[int, ...]
+    truth: tuple[str, ...]
+    rival: tuple[str, ...] = ()
     now: float = 0.0
+    unit: str = ''
+    scale: float = 1.0
 
     def misfit(self, gram: Array) -> float:
         """Return the whitened squared residual of the refitted rival."""
         R, whole = list(self.refitted), gram @ self.missing
-        return max(float(self.missing @ whole - whole[R] @ solve(gram[np.ix_(R, R)], whole[R])),
-                   0.0)
+        largest = float(self.missing @ whole)
+        misfit = largest - float(whole[R] @ solve(gram[np.ix_(R, R)], whole[R]))
+        return misfit if misfit > UNSEEN * largest else 0.0
 
 
-def separation(contests: Sequence[Contest], gram: Array) -> float:
-    """Return minus ln of the mean of 1/misfit of contests: nearly ln of the smallest misfit."""
-    misfits = np.array([contest.misfit(gram) for contest in contests])
-    return -float(np.log(np.mean(1 / (misfits + EVIDENCE_FLOOR))))
-
-
-@dataclass(frozen=True)
-class Precision:
-    """D-optimality: ln of the determinant of the information on some coefficients.
-
-    Parameters
-    ----------
-    index, others : tuple of int
-        Places of the coefficients, and of what is estimated with them.
-    scales : (k,) array
-        Sizes at which the coefficients matter: known to that beforehand.
-    """
-
-    index: tuple[int, ...]
-    others: tuple[int, ...]
-    scales: Array
-
-    def own(self, gram: Array) -> Array:
-        """Return the information that the others do not explain, per scale, (k, k)."""
-        I, R = list(self.index), list(self.others)  # noqa: E741
-        S = gram[np.ix_(I, I)]
-        if R:
-            cross = gram[np.ix_(R, I)]
-            S = S - cross.T @ solve(gram[np.ix_(R, R)], cross)
-        return (S + S.T) / 2 * np.outer(self.scales, self.scales)
-
-    def value(self, gram: Array) -> float:
-        """Return ln det(1 + information)."""
-        found = np.linalg.eigvalsh(self.own(gram))
-        return float(np.sum(np.log1p(np.maximum(found, 0.0))))
-
-    def deviations(self, gram: Array) -> Array:
-        """Return standard deviations of the coefficients, (k,); infinite without information."""
-        values, axes = np.linalg.eigh(self.own(gram))
-        unseen = values <= UNSEEN
-        variances = axes[:, ~unseen] ** 2 @ (1 / values[~unseen])
-        variances[np.any(np.abs(axes[:, unseen]) > WEIGHT, axis=1)] = np.inf
-        return np.sqrt(variances) * self.scales
+def left_open(contests: Sequence[Contest], gram: Array) -> float:
+    """Return the mean of 1 / (1 + misfit) of contests."""
+    return float(np.mean([1 / (1 + contest.misfit(gram)) for contest in contests]))
 
 
 def solve(matrix: Array, side: Array) -> Array:
@@ -332,7 +297,7 @@ def solve(matrix: Array, side: Array) -> Array:
 
 @dataclass(frozen=True)
 class Question:
-    """Rival sets and uncertain effects that a motion is designed to decide.
+    """Rival sets or uncertain numbers that a motion is designed to decide.
 
     Parameters
     ----------
@@ -342,8 +307,7 @@ class Question:
     known : (P, P) array
         Information of recordings and tolerances.
     contests : tuple of Contest
-        For 'separate'.
-    subjects : tuple of tuple of FittedTerm
+    subjects : tuple of str
         Effects in question.
     noise_floor : float
         Largest root of the mean squared noise of a drive [N].
@@ -353,15 +317,8 @@ class Question:
     information: Information
     known: Array
     contests: tuple[Contest, ...]
-    subjects: tuple[tuple[FittedTerm, ...], ...]
+    subjects: tuple[str, ...]
     noise_floor: float
-
-    @property
-    def precision(self) -> Precision:
-        """Precision of the uncertain effects, for a new robot with its model's numbers."""
-        terms = [term for subject in self.subjects for term in subject]
-        numbers = self.information.numbers if self.kind == COMMISSION else ()
-        return precision_of(self.information, terms, numbers)
 
     def gram(self, motions: Motions, series: JointSeries) -> Array:
         """Return the information of a motion, (P, P)."""
@@ -371,24 +328,7 @@ class Question:
 
     def worth(self, gram: Array) -> float:
         """Return the value of a motion in addition to the recordings."""
-        total = self.known + gram
-        return (separation(self.contests, total) if self.contests
-                else self.precision.value(total))
-
-    def without_hopeless(self, grams: Sequence[Array]) -> Question:
-        """Return the question without the contests that none of some motions would decide."""
-        hopeful = tuple(contest for contest in self.contests if contest.now + max(
-            contest.misfit(self.known + gram) for gram in grams) - contest.misfit(self.known)
-            > DECISIONS.rival_margin)
-        return replace(self, contests=hopeful) if hopeful else self
-
-
-def precision_of(information: Information, terms: Sequence[FittedTerm],
-                 numbers: tuple[int, ...] = ()) -> Precision:
-    """Return how well the coefficients of terms and numbers of the model are known."""
-    return Precision((*numbers, *information.places(terms)),
-                     tuple(k for k in range(len(information.base)) if k not in numbers),
-                     np.concatenate([np.ones(len(numbers)), *(term.scales for term in terms)]))
+        return -left_open(self.contests, self.known + gram)
 
 
 def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
@@ -401,8 +341,9 @@ def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Mot
     adopted, fits = table.reported, table.last
     if not adopted.effects:
         return commissioning(model, recordings, motions)
+    # Effects of one set are fitted together.
     return _question(ESTIMATE, fits.design, fits.regression, adopted.fit, motions,
-                     [_terms(adopted, (candidate,)) for candidate in adopted.effects])
+                     [_terms(adopted, adopted.effects)])
 
 
 def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) -> Question:
@@ -425,8 +366,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
-    question = _question(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, terms[:1],
-                         every)
+    question = _question(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, every)
     information, contests = question.information, []
     for (refitted, true), more in joined.items():
         free = information.places((*terms[refitted], *more))
@@ -436,9 +376,9 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
         sides = ((rival.missing, rival.instead) if true == 0
                  else (rival.instead, rival.missing))
         contests.append(Contest(
-            *sides, information.force(terms[true]) - certain,
-            (*range(len(information.base)), *free), rows[refitted].cost - rows[true].cost))
-    return replace(question, contests=tuple(contests))
+            information.force(terms[true]) - certain, (*range(len(information.base)), *free),
+            *sides, rows[refitted].cost - rows[true].cost))
+    return replace(question, contests=tuple(contests), subjects=_names(terms[:1]))
 
 
 def _terms(fitted: CandidateSet, candidates: Sequence[EffectCandidate]) -> tuple[FittedTerm, ...]:
@@ -462,7 +402,7 @@ def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm
 
 
 def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
-                  noise: float | None = None) -> Question:
+                  ) -> Question:
     """Return the question of a robot that nothing, or little, is known of.
 
     It is of the model's own numbers, and of the effects that are common.
@@ -471,30 +411,26 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
     ----------
     model : DriveModel
     recordings : sequence of Recording
-        What is there already; may be none.
+        What is there already; may be none: then noise is a share of each drive's largest effort.
     motions : Motions
-    noise : float, optional
-        Standard deviation of means of the effort over 0.01 s [N, N m], where nothing is recorded;
-        by default a share of each drive's largest effort.
     """
     if not (model.moves_joints or model_numbers(model)):
         model = DriveModel.from_parameters({**model.values, **{
             f'tolerances.{key}': TOLERANCE for key in NUMBERS if np.any(model.values[key])}})
-    subjects = [(term,) for term in _common_terms(model)]
+    groups = [(term,) for term in _common_terms(model)]
     if recordings:
         design = Design.of(model, recordings)
         regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
-        return _question(COMMISSION, design, regression, regression.fit(()), motions, subjects)
+        return _question(COMMISSION, design, regression, regression.fit(()), motions, groups)
     series = motions.drawn(0, 1)[0]
     largest = np.abs(motions.forces(series, coarse_time(series)).total).max(axis=0)
-    levels = np.maximum(NOISE_SHARE * largest, 1e-9) if noise is None else np.full(
-        len(largest), noise)
-    information = _information(model, model, motions, subjects, {
+    levels = np.maximum(NOISE_SHARE * largest, 1e-9)
+    information = _information(model, model, motions, groups, {
         d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
         for d, level in enumerate(levels)})
-    return Question(COMMISSION, information, information.prior(), (), tuple(subjects),
-                    float(levels.max()))
+    return Question(COMMISSION, information, information.prior(),
+                    _numbers(information, groups, True), _names(groups), float(levels.max()))
 
 
 def _common_terms(model: DriveModel) -> list[FittedTerm]:
@@ -523,14 +459,40 @@ def _common_terms(model: DriveModel) -> list[FittedTerm]:
 
 
 def _question(kind: str, design: Design, regression: Regression, fit: JointFit, motions: Motions,
-              subjects: Sequence[Sequence[FittedTerm]],
-              every: Sequence[Sequence[FittedTerm]] = ()) -> Question:
-    """Return a question after recordings, under the noise of a fit; `every`: all columns."""
-    information = _information(design.given, design.model, motions, every or subjects,
-                               regression.noise(fit))
+              groups: Sequence[Sequence[FittedTerm]]) -> Question:
+    """Return the question of the numbers of effects after recordings, under the noise of a fit."""
+    information = _information(design.given, design.model, motions, groups, regression.noise(fit))
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
     return Question(kind, information, information.of_recordings(design, regression, fit),
-                    (), tuple(map(tuple, subjects)), floor)
+                    _numbers(information, groups, kind == COMMISSION), _names(groups), floor)
+
+
+def _names(groups: Sequence[Sequence[FittedTerm]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(term.component.effect.name for terms in groups for term in terms))
+
+
+def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]], with_model: bool,
+             ) -> tuple[Contest, ...]:
+    """Return a contest for each number of terms, which are fitted group by group, and of the model.
+
+    Columns of the model's numbers are per standard deviation of what is known beforehand.
+    """
+    base, model = range(len(information.base)), information.model
+    asked: list[tuple[int, tuple[str, str, float, float], tuple[int, ...]]] = [
+        (k, (column.number.label, column.number.unit, column.number.deviation, 1.0), ())
+        for k, column in enumerate(information.base)
+        if with_model and isinstance(column, ModelNumber)]
+    for terms in groups:
+        places, labels = information.places(terms), [
+            label for term in terms for label in term.labels(model)]
+        asked += [(place, label, places) for place, label in zip(places, labels, strict=True)]
+    found = []
+    for place, (label, unit, scale, coefficient), fitted in asked:
+        missing = np.zeros(information.size)
+        missing[place] = coefficient
+        found.append(Contest(missing, tuple(k for k in (*base, *fitted) if k != place), (label,),
+                             unit=unit, scale=scale))
+    return tuple(found)
 
 
 def _information(given: DriveModel, model: DriveModel, motions: Motions,
