@@ -25,9 +25,13 @@ from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffec
 from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.description import FLOATING, Frame, Loop, principal_inertia
+from pprs_dynamics.physics.mechanism.description import (
+    FLOATING,
+    Frame,
+    Joint,
+    principal_inertia,
+)
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, EQUATIONS, JOINTS, ROBOT
@@ -115,7 +119,9 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
     values, loops = model.values, {loop.name for loop in model.robot.structure.loops}
     for key, number in OF_KEYS.items():
         if key in values:
-            yield key, _spread(model, key, number)
+            numbers = np.broadcast_to(np.asarray(values[key], dtype=float), len(model.drives))
+            yield key, {drive: {number: value} for drive, value in zip(
+                model.drives, numbers.tolist(), strict=True)}
     if viscous := values.get('friction.revolute.viscous'):
         yield 'friction.revolute.viscous', {name: {DAMPING: viscous} for name in HINGES}
     for key in ('friction.offset', 'friction.drives.coulomb', *(
@@ -131,13 +137,6 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
         if key.startswith(JOINTS) and parameter != 'radius' and value:
             of_passive = None if name in loops else OF_PASSIVE.get(parameter)
             yield key, None if of_passive is None else {name: {of_passive: value}}
-
-
-def _spread(model: DriveModel, key: str, number: str) -> Joints:
-    """Return the numbers of all drives, or the number that is the same in all."""
-    values = np.broadcast_to(np.asarray(model.values[key], dtype=float), len(model.drives))
-    return {drive: {number: value}
-            for drive, value in zip(model.drives, values.tolist(), strict=True)}
 
 
 def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Joints | None:
@@ -179,7 +178,8 @@ class Body:
     ----------
     row : int
         Of the mechanism's tables.
-    name, joint : str
+    name : str
+    joint : Joint
     kind : {'free', 'hinge', 'slide'}
     parent : int
         Row, 0 for the base.
@@ -201,7 +201,7 @@ class Body:
 
     row: int
     name: str
-    joint: str
+    joint: Joint
     kind: str
     parent: int
     frame: Frame
@@ -217,6 +217,12 @@ class Body:
         """Inertia about the centre in the body's axes, (3, 3) [kg m^2]."""
         return self.axes @ np.diag(self.moments) @ self.axes.T
 
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Range of the joint, None where it is not limited."""
+        found = self.joint.lower, self.joint.upper
+        return found if np.all(np.isfinite(found)) else None
+
 
 @dataclass(frozen=True)
 class ExportedRobot:
@@ -230,7 +236,7 @@ class ExportedRobot:
         Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
         it has them.
     bodies : tuple of Body
-        Parents first.
+        Each before what hangs on it, as they stand in MJCF.
     not_expressed : tuple of str
         Keys of the model file and names of effects; of robots with loops in URDF, their loops.
     """
@@ -260,7 +266,7 @@ def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str,
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
     structure, t = mechanism.structure, mechanism.structure.tables
     _, _, home = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
-    found: dict[int, tuple[str, str, int]] = {}
+    found: dict[int, tuple[Joint, str, int]] = {}
     for joint in structure.description.joints.values():
         row = structure.links[joint.child][0]
         if joint.kind == FLOATING and structure.moved_by[row] == joint.child:
@@ -268,19 +274,23 @@ def _bodies(mechanism: Mechanism) -> Iterator[Body]:
             if parent:
                 raise ModelError('robot.urdf', joint.name, 'hang on the base: a free body on a '
                                  'moving one cannot be exported')
-            found[row] = (joint.name, FREE, parent)
+            found[row] = joint, FREE, parent
         elif structure.rows.get(joint.name) is not None:
             row = structure.rows[joint.name]
-            found[row] = (joint.name, HINGE if t.turns[row] else SLIDE, int(t.parent[row]))
-    for row in sorted(found):
-        joint_name, kind, parent = found[row]
-        c = int(t.coordinate[row])
+            found[row] = joint, HINGE if t.turns[row] else SLIDE, int(t.parent[row])
+
+    def way(row: int) -> tuple[int, ...]:
+        """Return the rows from the base to a body."""
+        return (*way(found[row][2]), row) if row else ()
+
+    for row in sorted(found, key=way):
+        joint, kind, parent = found[row]
         frame = (Frame(home.R[0, row], home.p[0, row]) if kind == FREE
                  else Frame(t.place_R[row], t.place_p[row]))
         name = structure.moved_by[row]
-        yield Body(row, name, joint_name, kind, parent, frame, t.axis[row],
+        yield Body(row, name, joint, kind, parent, frame, t.axis[row],
                    *_inertia(name, mechanism.by_joint[row]),
-                   float(t.ratio[row] * structure.home[c] + t.offset[row]))
+                   float(t.ratio[row] * structure.home[int(t.coordinate[row])] + t.offset[row]))
 
 
 def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
@@ -430,22 +440,16 @@ def _mjcf(robot: ExportedRobot) -> Element:
     _add(world, 'light', pos='0 0 3', dir='0 0 -1')
     elements = {0: world}
     drawn, width = _drawn(robot), THICKNESS * structure.size
-    drives = dict(zip(structure.drives, structure.effort, strict=True))
     for body in robot.bodies:
         own = elements[body.row] = _add(elements[body.parent], 'body', name=body.name,
                                         pos=body.frame.p, quat=_quaternion(body.frame.R))
         _add(own, 'inertial', pos=body.centre, quat=_quaternion(body.axes), mass=body.mass,
              diaginertia=body.moments)
         if body.kind == FREE:
-            _add(own, 'freejoint', name=body.joint)
+            _add(own, 'freejoint', name=body.joint.name)
         else:
-            joint = structure.description.joints[body.joint]
-            numbers = robot.joints.get(body.joint, {})
-            limited = math.isfinite(joint.lower) and math.isfinite(joint.upper)
-            _add(own, 'joint', name=body.joint, type=body.kind, axis=body.axis,
-                 range=(joint.lower, joint.upper) if limited else None,
-                 **{key: numbers.get(key) for key in (DAMPING, FRICTION, ARMATURE, STIFFNESS,
-                                                      SPRINGREF)})
+            _add(own, 'joint', name=body.joint.name, type=body.kind, axis=body.axis,
+                 range=body.limits, **robot.joints.get(body.joint.name, {}))
         for point in drawn[body.row]:
             _add(own, 'geom', type='capsule', fromto=(0, 0, 0, *point), size=width / 2,
                  contype='0', conaffinity='0', group='1')
@@ -455,45 +459,17 @@ def _mjcf(robot: ExportedRobot) -> Element:
         _add(elements[row], 'site', name=name, pos=frame.p, quat=_quaternion(frame.R))
     _close(robot, elements, _add(root, 'equality'))
     actuators = _add(root, 'actuator')
-    for name, effort in drives.items():
+    for name, effort in zip(structure.drives, structure.effort, strict=True):
         _add(actuators, 'motor', name=name, joint=name,
              ctrlrange=(-effort, effort) if math.isfinite(effort) else None)
-    _add(_add(root, 'keyframe'), 'key', name='home', qpos=_home(robot.bodies))
+    _add(_add(root, 'keyframe'), 'key', name='home', qpos=np.concatenate([
+        (*body.frame.p, *_quaternion(body.frame.R)) if body.kind == FREE else (body.home,)
+        for body in robot.bodies]))
     return root
 
 
-def _home(bodies: tuple[Body, ...]) -> list[float]:
-    """Return positions of all joints, in the order in which the bodies stand in the file."""
-    below: dict[int, list[Body]] = {}
-    for body in bodies:
-        below.setdefault(body.parent, []).append(body)
-    positions: list[float] = []
-
-    def visit(row: int) -> None:
-        for body in below.get(row, []):
-            positions.extend((*body.frame.p, *_quaternion(body.frame.R)) if body.kind == FREE
-                             else (body.home,))
-            visit(body.row)
-
-    visit(0)
-    return positions
-
-
 def _close(robot: ExportedRobot, elements: Mapping[int, Element], equality: Element) -> None:
-    """Add sites and constraints for loops and couplings."""
-    structure = robot.mechanism.structure
-    for name, sites, weld in closures(structure):
-        for site, row, frame in sites:
-            _add(elements[row], 'site', name=site, pos=frame.p, quat=_quaternion(frame.R))
-        _add(equality, 'weld' if weld else 'connect', name=name, site1=sites[0][0],
-             site2=sites[1][0])
-    for name, leader, ratio, offset in structure.couplings:
-        _add(equality, 'joint', name=f'{name}_mimic', joint1=name, joint2=leader,
-             polycoef=(offset, ratio, 0, 0, 0))
-
-
-def closures(structure: Structure) -> list[tuple[str, list[tuple[str, int, Frame]], bool]]:
-    """Return MuJoCo's constraints for the loops: name, two sites by row and frame, is a weld.
+    """Add sites and constraints for loops and couplings.
 
     A hinge is two points on its axis that stay together.
 
@@ -502,25 +478,23 @@ def closures(structure: Structure) -> list[tuple[str, list[tuple[str, int, Frame
     ModelError
         For a loop that is neither spherical nor revolute nor fixed.
     """
-    found = []
-    t = structure.tables
+    structure, t = robot.mechanism.structure, robot.mechanism.structure.tables
     for k, loop in enumerate(structure.loops):
-        sides = (('a', int(t.loop_a[k]), Frame(t.a_R[k], t.a_p[k])),
-                 ('b', int(t.loop_b[k]), Frame(t.b_R[k], t.b_p[k])))
-        for name, along in _points(loop, structure.size):
-            at = Frame(p=np.array([0.0, 0.0, along]))
-            found.append((name, [(f'{name}_{side}', row, frame @ at)
-                                 for side, row, frame in sides], loop.kind == 'fixed'))
-    return found
-
-
-def _points(loop: Loop, size: float) -> list[tuple[str, float]]:
-    if loop.kind in ('spherical', 'fixed'):
-        return [(loop.name, 0.0)]
-    if loop.kind == 'revolute':
-        return [(loop.name, 0.0), (f'{loop.name}_axis', size / 10)]
-    raise ModelError(f'robot.loops.{loop.name}.type', loop.kind,
-                     'be spherical, revolute or fixed: MuJoCo closes no other loops')
+        if loop.kind not in ('spherical', 'revolute', 'fixed'):
+            raise ModelError(f'robot.loops.{loop.name}.type', loop.kind,
+                             'be spherical, revolute or fixed: MuJoCo closes no other loops')
+        points = {loop.name: 0.0}
+        if loop.kind == 'revolute':
+            points[f'{loop.name}_axis'] = structure.size / 10
+        for name, along in points.items():
+            for side, rows, R, p in (('a', t.loop_a, t.a_R, t.a_p), ('b', t.loop_b, t.b_R, t.b_p)):
+                _add(elements[int(rows[k])], 'site', name=f'{name}_{side}',
+                     pos=p[k] + along * R[k][:, 2], quat=_quaternion(R[k]))
+            _add(equality, 'weld' if loop.kind == 'fixed' else 'connect', name=name,
+                 site1=f'{name}_a', site2=f'{name}_b')
+    for name, leader, ratio, offset in structure.couplings:
+        _add(equality, 'joint', name=f'{name}_mimic', joint1=name, joint2=leader,
+             polycoef=(offset, ratio, 0, 0, 0))
 
 
 def _urdf(robot: ExportedRobot) -> Element:
@@ -530,7 +504,6 @@ def _urdf(robot: ExportedRobot) -> Element:
     names = {0: base, **{body.row: body.name for body in robot.bodies}}
     drawn, width = _drawn(robot), THICKNESS * structure.size
     _add(root, 'link', name=base)
-    mimics = {name: coupling for name, *coupling in structure.couplings}
     for body in robot.bodies:
         link = _add(root, 'link', name=body.name)
         inertial = _add(link, 'inertial')
@@ -543,7 +516,7 @@ def _urdf(robot: ExportedRobot) -> Element:
             _draw_rod(link, point, width)
         if not drawn[body.row]:
             _add(_add(_add(link, 'visual'), 'geometry'), 'sphere', radius=width)
-        _urdf_joint(root, robot, body, names[body.parent], mimics.get(body.joint))
+        _urdf_joint(root, robot, body, names[body.parent])
     for name, row, frame in robot.frames:
         _add(root, 'link', name=name)
         joint = _add(root, 'joint', name=f'{name}_fixed', type='fixed')
@@ -553,29 +526,27 @@ def _urdf(robot: ExportedRobot) -> Element:
     return root
 
 
-def _urdf_joint(root: Element, robot: ExportedRobot, body: Body, parent: str,
-                mimic: list[Any] | None) -> None:
-    joint = _add(root, 'joint', name=body.joint, type=URDF_KINDS[body.kind])
+def _urdf_joint(root: Element, robot: ExportedRobot, body: Body, parent: str) -> None:
+    said, mimic = body.joint, [
+        coupling for name, *coupling in robot.mechanism.structure.couplings
+        if name == body.joint.name]
+    is_endless = body.kind == HINGE and body.limits is None and not mimic
+    joint = _add(root, 'joint', name=said.name,
+                 type='continuous' if is_endless else URDF_KINDS[body.kind])
     _add(joint, 'parent', link=parent)
     _add(joint, 'child', link=body.name)
     _add(joint, 'origin', xyz=body.frame.p, rpy=_rpy(body.frame.R))
     if body.kind == FREE:
         return
     _add(joint, 'axis', xyz=body.axis)
-    said = robot.mechanism.structure.description.joints[body.joint]
-    limited = math.isfinite(said.lower) and math.isfinite(said.upper)
-    if not limited and body.kind == HINGE and mimic is None:
-        joint.set('type', 'continuous')
+    lower, upper = body.limits or (-UNLIMITED, UNLIMITED)
     speed, effort = (value if math.isfinite(value) else UNLIMITED
                      for value in (said.speed, said.effort))
-    _add(joint, 'limit', lower=said.lower if limited else -UNLIMITED,
-         upper=said.upper if limited else UNLIMITED, velocity=speed, effort=effort)
-    numbers = robot.joints.get(body.joint, {})
-    if numbers:
+    _add(joint, 'limit', lower=lower, upper=upper, velocity=speed, effort=effort)
+    if numbers := robot.joints.get(said.name, {}):
         _add(joint, 'dynamics', damping=numbers.get(DAMPING, 0.0),
              friction=numbers.get(FRICTION, 0.0))
-    if mimic is not None:
-        leader, ratio, offset = mimic
+    for leader, ratio, offset in mimic:
         _add(joint, 'mimic', joint=leader, multiplier=ratio, offset=offset)
 
 
