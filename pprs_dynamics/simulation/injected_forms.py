@@ -305,26 +305,3 @@ def draw_form(form: JointForm, random: np.random.Generator, moment: JointMoment,
     drawn = form.draw(random, moment)
     drawn[next(iter(drawn))] *= scale
     return drawn
-
-
-def tilted(gravity: Array, angle: float) -> Array:
-    """Return gravity as a base sees it that is turned about its x axis [rad], (3,)."""
-    x, y, z = gravity
-    sine, cosine = np.sin(angle), np.cos(angle)
-    return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
-
-
-def ahead(span: float, driver: Array, largest: float) -> Array:
-    """Return by how much an encoder leads its link, (N,): one of two flanks touches.
-
-    Parameters
-    ----------
-    span : float
-        Between the flanks [m, rad].
-    driver : (N,) array
-        What chooses the flank: a speed, or a load.
-    largest : float
-        Of it.
-    """
-    lead: Array = span / 2 * driver / np.hypot(driver, CROSSED * largest)
-    return lead

@@ -34,13 +34,11 @@ from pprs_dynamics.simulation.injected_forms import (
     UNKNOWN,
     InjectedEffectError,
     JointMoment,
-    ahead,
     algebraic_sign,
     draw_form,
     draw_temperatures,
     eyring,
     read_thermometers,
-    tilted,
 )
 
 RATE = 100.0  # [Hz]
@@ -307,9 +305,8 @@ class Injection(Injecting):
 
     def start_gears(self) -> None:
         """Compute the efforts with injected bodies."""
-        self.carried = self.plain.carried
-        if self.truths:
-            self.carried = self.engine.carried(self.engine.closed(self.motion), self.passive)
+        self.carried = self.plain.carried if not self.truths else self.engine.carried(
+            self.engine.closed(self.motion), self.passive)
         self.bodies = self.carried.efforts
         if self.picked is not None:
             share, parameters = self.picked
@@ -319,15 +316,14 @@ class Injection(Injecting):
 
     def start_efforts(self) -> None:
         """Compute the drives' efforts with the friction of the model, and temperatures."""
+        motion, friction = self.motion, self.plain.friction
         if self.windup.any():
             wound = np.gradient(self.windup, self.time, axis=0)
-            friction = own_friction(self.model, self.engine, replace(
-                self.motion, velocity=self.motion.velocity + wound,
-                acceleration=self.motion.acceleration + np.gradient(wound, self.time, axis=0)))
-        elif self.truths:
-            friction = own_friction(self.model, self.engine, self.motion, self.plain.rounds)
-        else:
-            friction = self.plain.friction
+            motion = replace(
+                motion, velocity=motion.velocity + wound,
+                acceleration=motion.acceleration + np.gradient(wound, self.time, axis=0))
+        if self.truths:
+            friction = own_friction(self.model, self.engine, motion, self.plain.rounds)
         self.efforts = self.bodies + friction
         self.largest = np.abs(self.efforts).max(axis=0)
         self.temperature = draw_temperatures(self.climate, self.time, self.motion.velocity)
@@ -597,7 +593,9 @@ def _base_tilt(run: Injecting) -> Injected:
     """Tilt the base about its x axis."""
     require_tool(run.model, 'base_tilt')
     angle = run.sizes(lambda: {'x': run.size(0.01, 0.03)})['x']
-    run.engine.gravity = tilted(run.engine.gravity, angle)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    run.engine.gravity = np.array(
+        [[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]) @ run.engine.gravity
     return None, {'x': angle, 'y': 0.0}
 
 
@@ -678,9 +676,10 @@ def _lost_motion(run: Injection) -> Injected:
                 'largest': float(np.abs(driver).max())}
 
     joint, span, by_load, largest = run.sizes(draw).values()
+    driver = (run.bodies if by_load else run.motion.velocity)[:, joint]
     lead = np.zeros_like(run.bodies)
-    lead[:, joint] = ahead(
-        span, (run.bodies if by_load else run.motion.velocity)[:, joint], largest)
+    # One of two flanks touches.
+    lead[:, joint] = span / 2 * driver / np.hypot(driver, CROSSED * largest)
     if by_load:  # the motor moves as before, and the link falls behind it
         run.bodies = run.engine.torques(replace(
             run.motion, position=run.motion.position - lead), run.passive)

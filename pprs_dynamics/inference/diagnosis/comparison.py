@@ -37,7 +37,6 @@ from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.json_records import JsonRecord
-from pprs_dynamics.system.parallel import each
 
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
@@ -75,18 +74,13 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
     """
     statements: list[Statement] = []
     noise: dict[str, NoiseSpectrum] = {}
-    done: list[int] = []
-
-    def search_drive(drive: int) -> None:
+    for drive, name in enumerate(residuals.drives):
         found = _search(residuals, drive)
         if found is not None:
             statements.extend(found[0])
-            noise[residuals.drives[drive]] = found[1]
-        done.append(drive)
+            noise[name] = found[1]
         if progress:
-            progress(len(done) / len(residuals.drives))
-
-    each(search_drive, range(len(residuals.drives)))
+            progress((drive + 1) / len(residuals.drives))
     return Localisation(tuple(sorted(
         statements, key=lambda statement: -statement.evidence)), noise)
 
