@@ -300,7 +300,9 @@ MISTAKES = {
                       'row 7, column slide_1/position must contain'),
     'a digit of another script': (lambda text: re.sub(r'\n0.01,[^,]*', '\n0.01,\u0663', text),
                                   'row 7, column slide_1/position must contain'),
-    'a word': (lambda text: text.replace('\n0.01,', '\nsoon,'), "row 7, column time .*'soon'"),
+    'a word below a cell without a value': (
+        lambda text: text.replace('\n0.01,', '\nsoon,').replace('\n0.008,', '\nN/A,'),
+        "row 7, column time .*'soon'"),
     'a decimal comma': (
         lambda text: text.replace(',', ';').replace('\n0.01;', '\n0,01;'), 'decimal comma'),
     'a short row': (lambda text: text[:-40], 'row 41 contains 13 cells, but the header 19'),

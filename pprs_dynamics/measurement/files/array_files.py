@@ -252,7 +252,7 @@ def _numpy(path: Path) -> dict[str, Any]:
     with ZipFile(path) as archive:
         require_size(path, sum(member.file_size for member in archive.infolist()))
     with np.load(path, allow_pickle=False) as content:
-        return {name: content[name] for name in content.files}
+        return dict(content)
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -66,8 +66,7 @@ def read_bag(
     drives = recorded.joints or recorded.names
     with opened_bag(path) as (bag, findings):
         samples = _by_columns(_read(bag, recorded, drives, topic, progress, findings), recorded)
-        stamps = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
-        return replace(samples, channels={**read_channels(bag, drives, stamps),
+        return replace(samples, channels={**read_channels(bag, drives, _stamps(samples)),
                                           **samples.channels})
 
 
@@ -279,13 +278,10 @@ def _tell_missing(
     path: Path, topic: str, drives: tuple[str, ...], states: JointStates,
 ) -> None:
     missing = [drive for drive in drives if drive not in states.names]
-    if missing:
-        raise UnreadableFileError(
-            path, f'{topic} lacks {", ".join(missing[:MOST])}; it contains '
-            + (', '.join(sorted(states.names)[:MOST]) or 'no names')
-            + f'; {missing_names(drives, states.names, path.name[:40])}')
     raise UnreadableFileError(
-        path, f'no single message on {topic} contains positions of all of {", ".join(drives)}')
+        path, f'{topic} lacks {", ".join(missing[:MOST])}; it contains '
+        + (', '.join(sorted(states.names)[:MOST]) or 'no names')
+        + f'; {missing_names(drives, states.names, path.name[:40])}')
 
 
 def _ignored(

@@ -251,7 +251,7 @@ class CsvTable:
         try:
             if is_date:
                 return _seconds_of(cell)
-            return parse_number(cell.replace(self.decimal, '.')) if cell else float('nan')
+            return parse_number('nan' if cell in NO_NUMBERS else cell.replace(self.decimal, '.'))
         except ValueError:
             comma = (' (a decimal comma: write columns: {decimal: ","} in the model file)'
                      if re.fullmatch(r'[-+\d]+,\d+', cell) else '')

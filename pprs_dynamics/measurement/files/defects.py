@@ -164,17 +164,17 @@ class Judgement:
         return first
 
     def _judge_positions(self) -> None:
-        found = signals.find_jumps(self.samples)
+        spikes, found = signals.find_jumps(self.samples)
         for drive, name in enumerate(self.samples.drives):
-            jumps = [(first, size) for first, k, size in found.jumps if k == drive]
+            jumps = [(first, size) for first, k, size in found if k == drive]
             size = max((size for _, size in jumps), key=abs, default=0.0)
             self._tell('position_jump', len(jumps),
                        f'the position of {name} jumps {counted(len(jumps), "time")}, by up to '
                        f'{size:.4g} {self.samples.unit_of(drive, "m")},',
                        [(first, first) for first, _ in jumps], [name])
-        self._split(np.array([first for first, _, _ in found.jumps], dtype=np.int64))
-        self._tell_values('position_spike', found.spikes, 'with a spike in the position of {}')
-        self._keep(~np.any(found.spikes, axis=1))
+        self._split(np.array([first for first, _, _ in found], dtype=np.int64))
+        self._tell_values('position_spike', spikes, 'with a spike in the position of {}')
+        self._keep(~np.any(spikes, axis=1))
 
     def _judge_spacing(self) -> None:
         time = self.samples.time

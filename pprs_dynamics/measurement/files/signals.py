@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -44,25 +42,17 @@ CUT_SAMPLES, CUT_RATIO, CUT_BESIDE = 10, 5.0, 5
 HELD_CHANGES, HELD_SHARE, HELD_LEAST = 30, 0.9, 1.9
 
 
-@dataclass(frozen=True)
-class Jumps:
-    """Steps of position that are no motion.
+def find_jumps(samples: Samples) -> tuple[Mask, list[tuple[int, int, float]]]:
+    """Return steps of position that are no motion; where the clock was set back there is none.
 
-    Parameters
-    ----------
+    Returns
+    -------
     spikes : (N, D) mask
         Positions that lie apart from both their sides.
     jumps : list of (sample, drive, size)
         The first sample after each lasting jump [m].
     """
-
-    spikes: Mask
-    jumps: list[tuple[int, int, float]]
-
-
-def find_jumps(samples: Samples) -> Jumps:
-    """Return spikes and jumps of all drives; where the clock was set back there is none."""
-    found = Jumps(np.zeros(samples.position.shape, dtype=bool), [])
+    spikes, jumps = np.zeros(samples.position.shape, dtype=bool), []
     steps = np.diff(samples.time)
     for drive in range(len(samples.drives)):
         moved = np.diff(samples.position[:, drive])
@@ -76,13 +66,12 @@ def find_jumps(samples: Samples) -> Jumps:
                          and abs(moved[first:k + 1].sum()) < SPIKE_REMAINDER * abs(moved[first])),
                         None)
             if back is None:
-                found.jumps.append((int(first) + 1, drive, float(moved[first])))
+                jumps.append((int(first) + 1, drive, float(moved[first])))
                 at += 1
             else:
-                found.spikes[first + 1:back + 1, drive] = True
+                spikes[first + 1:back + 1, drive] = True
                 at = int(np.searchsorted(fast, back)) + 1
-    found.jumps.sort()
-    return found
+    return spikes, sorted(jumps)
 
 
 def alternates(values: Array) -> bool:
