@@ -26,7 +26,6 @@ References
 P. Whittle, Estimation and information in stationary time series, Ark. Mat. 2 (1953) 423-434.
 D. A. Harville, Maximum likelihood approaches to variance component estimation, J. Am. Stat.
 Assoc. 72 (1977) 320-338 (restricted likelihood, scoring).
-C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, Prentice-Hall (1974) (active set).
 """
 
 from __future__ import annotations
@@ -43,7 +42,8 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 # Scoring ends once a full step promises to lower -2 ln of the likelihood by less; a step is halved
 # until it brings a share of what it promises (Armijo), or is shorter than the least.
 CONVERGED, MOST_STEPS, SUFFICIENT, LEAST_STEP = 1e-4, 30, 1e-4, 1e-4
-MOST_ACTIVE, ROUNDED = 1000, 1e-13  # changes of the active set in a step; share that is rounding
+# Sweeps over the amplitudes in a step, and fall of -2 ln of the likelihood that ends them.
+MOST_SWEEPS, LEAST_FALL = 1000, 1e-9
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Exponents s of noise that goes on below the record, the prior odds of each against one corner, and
 # how far down S of a constant is taken. Share of constants beyond three standard deviations where
@@ -158,7 +158,7 @@ class NoiseShapes:
         found: Array = np.maximum(amplitudes, least[:, None])
         size, bands = self.at_bands.shape
         run(maximise_likelihood, found, squares, free, least, self.at_bands[:, 1:].copy(), steps,
-            np.empty((3, bands)), np.empty((5, size)), np.empty((2, size, size)))
+            np.empty((3, bands)), np.empty((2, size)), np.empty((size, size)))
         return found
 
 
@@ -213,11 +213,11 @@ def extrapolate(power: Array, counts: Array, slow: Array, of_constant: Array, fo
 
 
 def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array, phi: Array,
-                        steps: int, bands: Array, sizes: Array, grams: Array) -> None:
+                        steps: int, bands: Array, sizes: Array, gram: Array) -> None:
     """Move amplitudes to where their likelihood is highest: a loop over drives.
 
     Scoring is a regression of the bands' mean squares on the shapes, whose weights follow from the
-    last spectrum; that amplitudes are not below the least is exact.
+    last spectrum, with amplitudes that are not below the least.
 
     Parameters
     ----------
@@ -231,12 +231,12 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
     steps : int
         At most.
     bands : (3, B) array
-    sizes : (5, J) array
-    grams : (2, J, J) array
+    sizes : (2, J) array
+    gram : (J, J) array
         Work space.
     """
     power, root, change = bands[0], bands[1], bands[2]
-    gram, side, above = grams[0], sizes[0], sizes[1]
+    side, above = sizes[0], sizes[1]
     for d in range(found.shape[0]):
         before = 0.0
         for b in range(phi.shape[1]):
@@ -259,7 +259,9 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
                     for b in range(phi.shape[1]):
                         total += root[b] * phi[i, b] * phi[j, b]
                     gram[i, j] = gram[j, i] = total
-            solve_non_negative(gram, side, above, sizes[2:], grams[1])
+            for j in range(phi.shape[0]):
+                above[j] = max(found[d, j] - least[d], 0.0)
+            solve_non_negative(gram, side, above)
             promised = 0.0
             for b in range(phi.shape[1]):
                 change[b] = 0.0
@@ -285,9 +287,8 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
                 power[b] += share * change[b]
 
 
-def solve_non_negative(gram: Array, side: Array, found: Array, sizes: Array, factor: Array,
-                       ) -> None:
-    """Write x that minimises x' G x - 2 x' s where x >= 0, by the active set of Lawson and Hanson.
+def solve_non_negative(gram: Array, side: Array, found: Array) -> None:
+    """Move x to where x' G x - 2 x' s is least with x >= 0, one coordinate after the other.
 
     Parameters
     ----------
@@ -296,59 +297,19 @@ def solve_non_negative(gram: Array, side: Array, found: Array, sizes: Array, fac
     side : (J,) array
         s
     found : (J,) array
-        x, written to.
-    sizes : (3, J) array
-    factor : (J, J) array
-        Work space.
+        x to start from, written to.
     """
-    size, trial, rest, chosen = len(side), sizes[0], sizes[1], sizes[2]
-    most = 0.0  # slope, in units in which G has a diagonal of 1
-    for i in range(size):
-        found[i] = chosen[i] = 0.0
-        rest[i] = side[i]
-        most = max(most, abs(side[i]) / math.sqrt(gram[i, i]))
-    for _ in range(MOST_ACTIVE):
-        new, steepest = -1, ROUNDED * most
-        for i in range(size):
-            if chosen[i] == 0.0 and rest[i] > steepest * math.sqrt(gram[i, i]):
-                new, steepest = i, rest[i] / math.sqrt(gram[i, i])
-        if new < 0:
+    for _ in range(MOST_SWEEPS):
+        fall = 0.0
+        for i in range(len(side)):
+            slope = side[i]
+            for j in range(len(side)):
+                slope -= gram[i, j] * found[j]
+            step = max(slope / gram[i, i], -found[i])
+            found[i] += step
+            fall += step * (2 * slope - step * gram[i, i])
+        if fall < LEAST_FALL:
             return
-        chosen[new] = 1.0
-        while True:
-            # Cholesky's factor of the chosen ones; 0 for those that others explain to rounding.
-            for i in range(size):
-                trial[i] = side[i]
-                for j in range(i + 1):
-                    factor[i, j] = 0.0
-                    if chosen[i] == chosen[j] == 1.0:
-                        factor[i, j] = gram[i, j]
-                        for k in range(j):
-                            factor[i, j] -= factor[i, k] * factor[j, k]
-                        if i > j:
-                            factor[i, j] /= factor[j, j]
-                        else:
-                            factor[i, i] = math.sqrt(max(factor[i, i], ROUNDED * gram[i, i]))
-                for j in range(i):
-                    trial[i] -= factor[i, j] * trial[j]
-                trial[i] = trial[i] / factor[i, i] if chosen[i] == 1.0 else 0.0
-            share, nearest = 1.0, -1
-            for i in range(size - 1, -1, -1):
-                if chosen[i] == 1.0:
-                    for j in range(i + 1, size):
-                        trial[i] -= factor[j, i] * trial[j]
-                    trial[i] /= factor[i, i]
-                    if trial[i] <= 0.0 and found[i] <= share * (found[i] - trial[i]):
-                        share, nearest = found[i] / (found[i] - trial[i]), i
-            for i in range(size):
-                found[i] += share * (trial[i] - found[i])
-            if nearest < 0:
-                break
-            found[nearest] = chosen[nearest] = 0.0
-        for i in range(size):
-            rest[i] = side[i]
-            for j in range(size):
-                rest[i] -= gram[i, j] * found[j]
 
 
 @dataclass(frozen=True)
