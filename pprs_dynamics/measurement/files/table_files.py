@@ -260,11 +260,9 @@ def _prefix(
     complete = [prefix for prefix, columns in found.items()
                 if all((drive, 'position') in columns for drive in drives)]
     if not complete:
-        joints = sorted({f'{prefix}/{drive}' if prefix else drive
-                         for prefix, columns in found.items()
-                         for drive, quantity in columns if quantity == 'position'})
-        known = {drive for columns in found.values()
-                 for drive, quantity in columns if quantity == 'position'}
+        joints = sorted(str(name).removesuffix('/position') for columns in found.values()
+                        for (_, quantity), name in columns.items() if quantity == 'position')
+        known = {joint.rpartition('/')[2] for joint in joints}
         missing = [drive for drive in drives if drive not in known] or list(drives)
         raise UnreadableFileError(
             path, f'no {", ".join(f"{drive}/position" for drive in missing[:MOST])}'

@@ -57,37 +57,29 @@ class SamplingGrid:
         """Return values of the samples, (n, D), at equal steps: by a cubic spline."""
         if self.is_regular:
             return values
-        from scipy.interpolate import make_interp_spline
-
-        steps = np.arange(int(self.places[-1]) + 1)
-        return make_interp_spline(self.places, values, k=3)(steps)
+        return _spline(self.places, values, np.arange(int(self.places[-1]) + 1.0))
 
     def inside(self, edge: int) -> slice:
         """Return the samples that lie at least `edge` steps from both ends."""
-        margin = edge if self._has_whole_places else edge + 1
-        last = int(self.places[-1]) - margin
-        return slice(int(np.searchsorted(self.places, margin)),
+        last = int(self.places[-1]) - edge
+        return slice(int(np.searchsorted(self.places, edge)),
                      int(np.searchsorted(self.places, last, side='right')))
 
     def at_samples(self, values: Array, edge: int, kept: slice) -> Array:
         """Return values at equal steps without the edges, (n - 2 edge, D), at samples `kept`."""
         places = self.places[kept] - edge
-        if self._has_whole_places:
-            whole = places.astype(int)
-            return values[whole[0]:whole[-1] + 1] if self.is_regular else values[whole]
-        # A cubic through the four nearest steps: these values are smooth over many steps.
-        k = np.clip(places.astype(int), 1, len(values) - 3)
-        x = (places - k)[:, None]
-        result: Array = (
-            values[k - 1] * (-x * (x - 1) * (x - 2) / 6)
-            + values[k] * ((x + 1) * (x - 1) * (x - 2) / 2)
-            + values[k + 1] * (-(x + 1) * x * (x - 2) / 2)
-            + values[k + 2] * ((x + 1) * x * (x - 1) / 6))
-        return result
+        whole = places.astype(int)
+        found: Array = values[whole] if np.all(places == whole) else _spline(
+            np.arange(float(len(values))), values, places)
+        return found
 
-    @property
-    def _has_whole_places(self) -> bool:
-        return bool(np.all(self.places == np.rint(self.places)))
+
+def _spline(x: Array, values: Array, at: Array) -> Array:
+    """Return values (n, D) at places x (n,) between these, by a cubic spline."""
+    from scipy.interpolate import make_interp_spline
+
+    found: Array = make_interp_spline(x, values, k=3)(at)
+    return found
 
 
 def find_grid(time: Array, position: Array) -> tuple[SamplingGrid, str]:
