@@ -40,7 +40,7 @@ from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions, platform_motion
+from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions
 from pprs_dynamics.inference.experiments.next_experiment import design_experiment
 from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.measurement.files.recording import Recording
@@ -107,13 +107,14 @@ def times(duration: float) -> np.ndarray:
 
 def poor_motions(seed: int) -> dict[str, PlatformMotion]:
     """Return motions of little information: up and down only, and slow and small."""
-    parameters = np.zeros((6, JointSeries.size(HEAVE_HARMONICS)))
+    parameters = np.zeros((3, JointSeries.size(HEAVE_HARMONICS)))
     parameters[2] = np.random.default_rng((seed, 5)).normal(size=parameters.shape[1])
     parameters[2] *= HEAVE / np.abs(parameters[2]).max()
-    series = JointSeries(parameters, np.array((*HOME, 0.0, 0.0, 0.0)), OLD, HEAVE_HARMONICS)
-    return {'heave': platform_motion(series, times(OLD)),
+    time = times(OLD)
+    heave = JointSeries(parameters, np.array(HOME), OLD, HEAVE_HARMONICS).motion(time).position
+    return {'heave': PlatformMotion.from_poses(time, heave, np.eye(4)[[3] * len(time)]),
             'slow': Excitation(duration=OLD, seed=seed, amplitude=0.025, tilt=0.05,
-                               highest_frequency=0.25).motion(times(OLD))}
+                               highest_frequency=0.25).motion(time)}
 
 
 def rivals_of(name: str, question: Question) -> list[str]:

@@ -17,7 +17,6 @@ from benchmarks.hidden.recordings import Case, Scene, make_case
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.experiments.motion_design import platform_motion
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import BY_FRICTION, Sensitivities
@@ -28,6 +27,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 
 MODEL = DriveModel.load()
@@ -145,11 +145,10 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
 
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     true = with_effects(MODEL, {'base_tilt': {'x': 0.045, 'y': -0.048}})
-    up_and_down = np.zeros((6, JointSeries.size(3)))
-    up_and_down[2] = 0.03, -0.02, 0.04
-    series = JointSeries(up_and_down, np.array((*HOME, 0.0, 0.0, 0.0)), TIME[-1], 3)
-    found = diagnose(MODEL, [record(true, 0.08,
-                                    motion=lambda time: platform_motion(series, time))])
+    up_and_down = JointSeries(np.outer((0.0, 0.0, 1.0), (0.03, -0.02, 0.04)), np.array(HOME),
+                              TIME[-1], 3)
+    found = diagnose(MODEL, [record(true, 0.08, motion=lambda time: PlatformMotion.from_poses(
+        time, up_and_down.motion(time).position, np.eye(4)[[3] * len(time)]))])
     assert [effect.name for effect in found.effects] == ['base_tilt']
     assert found.effects[0].parameters['x'].value == pytest.approx(0.045, abs=5e-4)
     assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)

@@ -30,7 +30,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.three_pprs.robot import condition_number
 
-REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from
 WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
 SLIDE_SPEED = 0.5  # [m/s], of the 3-PPRS, whose file has no limit of speed
 DRAWS, STEPS = 40, 160  # random motions, and steps from the best
@@ -74,27 +73,10 @@ class MotionLimits:
     margin: float = 0.1
     effort_reserve: float = 0.0
 
-    def middle(self, model: DriveModel) -> Array:
-        """Return the coordinates about which a robot moves.
-
-        Of the 3-PPRS the pose in the middle of its strokes, of others the positions of its joints.
-        """
-        if model.moves_joints:
-            return self._room(model)[0]
-        robot: Any = model.robot
-        geometry = robot.geometry
-        lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
-            np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
-        rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
-        height = self._room(model)[0][-1] + geometry.elbow_sign * rise
-        return np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
-
-    def excursions(self, model: DriveModel, position: Array, velocity: Array,
-                   acceleration: Array) -> Array:
-        """Return the excursion of each coordinate, over the largest that a search starts from."""
-        found: Array = np.abs(position - self.middle(model)).max(axis=0) / REACH if (
-            not model.moves_joints) else np.max([share.max(axis=0) for share in self._of_drives(
-                model, position, velocity, acceleration).values()], axis=0)
+    def excursions(self, model: DriveModel, motion: JointMotion) -> Array:
+        """Return the largest use of range, speed and acceleration of each drive, (D,)."""
+        found: Array = np.max([share.max(axis=0) for share in self._of_drives(
+            model, motion.position, motion.velocity, motion.acceleration).values()], axis=0)
         return found
 
     def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
@@ -111,7 +93,7 @@ class MotionLimits:
     def _of_drives(self, model: DriveModel, position: Array, velocity: Array,
                    acceleration: Array) -> dict[str, Array]:
         """Return the use of range, speed and acceleration of every drive, (N, D) each."""
-        middle, reach = self._room(model)
+        middle, reach = room(model)
         usual = np.inf if model.moves_joints else SLIDE_SPEED
         fastest = np.minimum(model.speed_limits, self.velocity or usual)
         return {name: np.abs(values) / ((1 - self.margin) * bound) for name, values, bound in (
@@ -132,49 +114,17 @@ class MotionLimits:
             'condition number': condition_number(robot.geometry, chains.J) / (
                 left * min(bounds.condition_number, self.condition_number))}
 
-    def _room(self, model: DriveModel) -> tuple[Array, Array]:
-        """Return the middle of the drives' motion and the way to either side, (D,) each."""
-        if model.moves_joints:
-            middle, reach = model.robot.structure.room(WIDEST)
-            return middle, reach
-        lower, upper = model.limits.strokes
-        return (lower + upper) / 2, (upper - lower) / 2
-
-
 class NoMotionError(PprsError, ValueError):
     """The robot has no room for a motion within its limits."""
 
 
-def platform_motion(series: JointSeries, time: Array) -> PlatformMotion:
-    """Return the motion of x, y, z [m] and of turns about z, the new y, the new x [rad].
-
-    Velocities and accelerations are exact.
-
-    Parameters
-    ----------
-    series : JointSeries
-        Of the six coordinates in this order.
-    time : (N,) array
-        [s]
-    """
-    from scipy.spatial.transform import Rotation  # commands without it start sooner
-
-    moved = series.motion(time)
-    psi, theta, _ = moved.position[:, 3:].T
-    zero, unit = np.zeros_like(psi), np.ones_like(psi)
-    # Axes of the three turns in `base`; the earlier turns carry the later axes along.
-    axes = [np.stack(axis, axis=1) for axis in (
-        (zero, zero, unit), (-np.sin(psi), np.cos(psi), zero),
-        (np.cos(psi) * np.cos(theta), np.sin(psi) * np.cos(theta), -np.sin(theta)))]
-    about_z, about_y, about_x = (
-        rate[:, None] * axis for rate, axis in zip(moved.velocity[:, 3:].T, axes, strict=True))
-    epsilon = (np.cross(about_z, about_y) + np.cross(about_z + about_y, about_x) + sum(
-        gain[:, None] * axis for gain, axis in zip(
-            moved.acceleration[:, 3:].T, axes, strict=True)))
-    return PlatformMotion(
-        moved.position[:, :3], Rotation.from_euler('ZYX', moved.position[:, 3:]).as_quat(),
-        moved.velocity[:, :3], about_z + about_y + about_x, moved.acceleration[:, :3], epsilon,
-        time)
+def room(model: DriveModel) -> tuple[Array, Array]:
+    """Return the middle of the drives' motion and the way to either side, (D,) each."""
+    if model.moves_joints:
+        middle, reach = model.robot.structure.room(WIDEST)
+        return middle, reach
+    lower, upper = model.limits.strokes
+    return (lower + upper) / 2, (upper - lower) / 2
 
 
 @dataclass(frozen=True)
@@ -201,7 +151,7 @@ class Motions:
     middle: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        middle = self.limits.middle(self.model)
+        middle, _ = room(self.model)
         object.__setattr__(self, 'middle', middle)
         standing = JointSeries(np.zeros((len(middle), JointSeries.size(2))), middle,
                                self.duration, 2)
@@ -217,9 +167,10 @@ class Motions:
                             'raise the limits in the model file')
 
     def sampled(self, series: JointSeries, time: Array) -> PlatformMotion | JointMotion:
-        """Return the motion of a series at times [s]."""
-        return (series.motion(time) if self.model.moves_joints
-                else platform_motion(series, time))
+        """Return the motion of a series at times [s]: of the 3-PPRS that of its platform."""
+        moved, robot = series.motion(time), self.model.robot
+        return moved if self.model.moves_joints else robot.motion_of_drives(
+            moved.position, moved.velocity, moved.acceleration).with_time(time)
 
     def forces(self, series: JointSeries, time: Array) -> Forces:
         """Return the model's forces along a series at times [s]."""
@@ -245,7 +196,7 @@ class Motions:
         share = self._excursions(series) * np.exp(
             -step * np.log(SMALLEST) * random.normal(size=len(a)))
         moved = a + step * np.abs(a).max(axis=1, keepdims=True) * random.normal(size=a.shape)
-        return self._sized(replace(series, coefficients=moved), np.minimum(share, self._largest))
+        return self._sized(replace(series, coefficients=moved), np.minimum(share, 1.0))
 
     def to_limits(self, series: JointSeries, scales: tuple[float, float]) -> JointSeries:
         """Return the motion times the largest factor, between two, that the limits allow."""
@@ -270,12 +221,7 @@ class Motions:
     def drawn(self, seed: int, count: int = DRAWS) -> list[JointSeries]:
         """Return random motions within the limits."""
         random = np.random.default_rng(seed)
-        return [self.to_limits(self.draw(random), (0.02, self._largest)) for _ in range(count)]
-
-    @property
-    def _largest(self) -> float:
-        """Excursion of a coordinate, over what it starts from, up to which a motion may grow."""
-        return 1.0 if self.model.moves_joints else 4.0
+        return [self.to_limits(self.draw(random), (0.02, 1.0)) for _ in range(count)]
 
     def _worst(self, series: JointSeries, time: Array | None = None) -> float:
         try:
@@ -284,9 +230,8 @@ class Motions:
             return OUTSIDE
 
     def _excursions(self, series: JointSeries) -> Array:
-        moved = series.motion(coarse_time(series))
         return np.maximum(self.limits.excursions(
-            self.model, moved.position, moved.velocity, moved.acceleration), 1e-12)
+            self.model, series.motion(coarse_time(series))), 1e-12)
 
     def _sized(self, series: JointSeries, share: Array) -> JointSeries:
         """Return a motion in which each coordinate has a share of its largest size."""
