@@ -25,24 +25,21 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     word_little,
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
-from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
+from pprs_dynamics.inference.search.candidates import PriorCosts
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.inference.search.scan import with_fast_noise
-from pprs_dynamics.inference.search.unknown import DrivePatterns
+from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
 from pprs_dynamics.system.json_records import JsonRecord
 
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
-PROPOSALS = 4  # fitted in full, of each scan
-PLACES = ('range', 'directed_range', 'fast')  # patterns that say where an error lies
-PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
+PROPOSALS, PROPOSED = 4, -30.0  # fitted in full, of each scan; lowest score of these
 
 
 @dataclass(frozen=True)
@@ -100,56 +97,24 @@ def _search(residuals: Residuals, drive: int) -> tuple[list[Statement], NoiseSpe
     statements: list[Statement] = []
     blocks: list[Block] = []
     while len(statements) < MOST_STATEMENTS:
-        winner = _best(drive_patterns, fit, blocks,
-                       {statement.variable for statement in statements})
-        if winner is None:
+        stated = {statement.variable for statement in statements}
+        tried = [(regression.fit([*blocks, candidate.block], near), candidate)
+                 for near in (fit, with_fast_noise(regression, fit))
+                 for candidate in best_patterns([drive_patterns], near, PROPOSALS, PROPOSED)
+                 if candidate.family.variable not in stated or candidate.pattern.kind == 'line']
+        found, winner = min(tried, key=lambda tried: tried[0].deviance + tried[1].terms.total,
+                            default=(fit, None))
+        if winner is None or not (evidence := (
+                fit.deviance - found.deviance - winner.terms.total)) > 0:
             break
-        candidate, found, evidence, other_variables = winner
-        statements.append(word_statement(drive_patterns, candidate, found.of(
-            candidate.block), evidence, other_variables))
-        blocks += [candidate.block, *_carried(drive_patterns, candidate)]
+        statements.append(word_statement(
+            drive_patterns, winner, found.of(winner.block), evidence))
+        # Any curve along the variable of a statement is explained with it.
+        blocks += [winner.block, *(
+            drive_patterns.family_block(family) for family in drive_patterns.families
+            if family.variable == winner.family.variable and not family.paired)]
         fit = regression.fit(blocks, found)
     return statements, regression.noise(fit)[drive]
-
-
-def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], stated: set[str],
-          ) -> tuple[UnknownCandidate, JointFit, float, tuple[str, ...]] | None:
-    """Return the pattern that lowers the cost most, with its fit, evidence and other_variables."""
-    regression = drive_patterns.regression
-    chosen: dict[object, tuple[UnknownCandidate, JointFit]] = {}
-    for near in (fit, with_fast_noise(regression, fit)):
-        for candidate, score in drive_patterns.proposals(near, PROPOSALS, always=True):
-            variable = candidate.family.variable
-            if (variable in stated and candidate.pattern.kind != 'line') or score < PROPOSED:
-                continue
-            chosen.setdefault(candidate.key, (candidate, near))
-    scored = []
-    for candidate, near in chosen.values():
-        refined = drive_patterns.refined(candidate, near)
-        if refined.pattern.kind in PLACES and np.mean(refined.rows[0] != 0) > MOST_SHARE:
-            continue
-        found = regression.fit([*blocks, refined.block], near)
-        scored.append((fit.deviance - found.deviance - refined.terms.total, refined, found))
-    scored.sort(key=lambda scored: -scored[0])
-    if not scored or scored[0][0] <= 0:
-        return None
-    evidence, winner, found = scored[0]
-    margin = drive_patterns.prior_costs.decisions.rival_margin
-    kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
-    other_variables = [rival.family.variable for score, rival, _ in scored
-                       if score > evidence - margin and rival.family.variable not in kin]
-    return winner, found, evidence, tuple(dict.fromkeys(other_variables))
-
-
-def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Block]:
-    """Return all columns that the variable of a statement can carry, as one block each."""
-    if winner.pattern.kind in ('line', 'offset'):
-        return []
-    variables = {winner.family.variable}
-    if winner.family.variable in ('velocity', 'direction'):
-        variables = {'velocity', 'direction'}
-    return [drive_patterns.family_block(family) for family in drive_patterns.families
-            if family.variable in variables and not family.paired]
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ class Statement(JsonRecord):
 
 def word_statement(
     drive_patterns: DrivePatterns, candidate: UnknownCandidate, coefficients: Array,
-    evidence: float, other_variables: tuple[str, ...] = (),
+    evidence: float,
 ) -> Statement:
     """Return the statement that a pattern makes.
 
@@ -124,8 +124,6 @@ def word_statement(
     coefficients : (1 or 2,) array
         Fitted [N].
     evidence : float
-    other_variables : tuple of str, optional
-        Variables that would do as well.
     """
     pattern, variable = candidate.pattern, candidate.family.variable
     drive, series = drive_patterns.residuals.drives[drive_patterns.d], drive_patterns.series
@@ -154,9 +152,6 @@ def word_statement(
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
     size = float(np.linalg.norm(coefficients))
     text = _sentence(variable, pattern, drive_patterns, signed, size, share, time, shape)
-    if other_variables:
-        others = listed([in_words(name) for name in other_variables], 'or')
-        text += f'; {others} explains it about as well'
     return Statement(drive, variable, limits, share, time, f'{drive}: {text}', evidence,
                      pattern.kind, float(np.mean(shape ** 2)))
 

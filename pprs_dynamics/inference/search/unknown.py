@@ -147,8 +147,7 @@ class DrivePatterns:
         block = self.regression.transformed_block({self.d: self.series.transform(rows)})
         return UnknownCandidate(family, pattern, self.d, full, block, self.prior_cost(family))
 
-    def proposals(self, fit: JointFit, count: int, always: bool = False,
-                  ) -> list[tuple[UnknownCandidate, float]]:
+    def proposals(self, fit: JointFit, count: int) -> list[tuple[UnknownCandidate, float]]:
         """Return the best patterns of different variables with their gains less their prior costs.
 
         Parameters
@@ -156,8 +155,6 @@ class DrivePatterns:
         fit : JointFit
             At whose noise.
         count : int
-        always : bool
-            Beyond `count`, those for which there is a plain word: a constant, friction.
         """
         weights = self.regression.weights(fit, self.d)
         scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
@@ -170,8 +167,7 @@ class DrivePatterns:
         scored.sort(key=lambda scored: -scored[0])
         found = [(self.candidate(family, family.patterns[best], family.pattern_columns(best)),
                   score)
-                 for rank, (score, family, best) in enumerate(scored)
-                 if rank < count or (always and family.is_plain)]
+                 for score, family, best in scored[:count]]
         line = self.line(fit)
         if line is not None:
             found.append((line, self.regression.gain(fit, line.block) - line.terms.total))
@@ -263,10 +259,13 @@ def _wave(frequency: float, time: Array) -> Array:
 
 
 def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
-                  ) -> list[UnknownCandidate]:
-    """Return the best patterns of any drive at the noise of a fit, their limits refined."""
+                  least: float = 0.0) -> list[UnknownCandidate]:
+    """Return the best patterns of any drive at the noise of a fit, their limits refined.
+
+    Of those whose gain less their prior cost is more than the least.
+    """
     found = [(candidate, gain, components) for components in libraries
              for candidate, gain in components.proposals(fit, count)]
     found.sort(key=lambda scored: -scored[1])
     return [components.refined(candidate, fit)
-            for candidate, gain, components in found[:count] if gain > 0]
+            for candidate, gain, components in found[:count] if gain > least]
