@@ -281,11 +281,25 @@ def test_amperes_and_shares_of_an_unknown_effort_are_a_question(
     assert not set('%_') & {*head} or 'position_scale' not in ''.join(first.questions)
 
 
-def test_a_torque_that_holds_no_model_is_a_question_and_no_other_unit(tmp_path: Path) -> None:
+@pytest.mark.parametrize(('mass', 'centre'), [(1.5, 0.375), (3.75, 0.24)])
+def test_amperes_are_a_question_with_other_masses(
+    mass: float, centre: float, tmp_path: Path,
+) -> None:
+    time, q, _, effort = run_of_arm()
+    urdf = ARM.replace('"3.0"', '"4.8"').replace('"1.5"', f'"{mass}"').replace(
+        '0 0 0.15', f'0 0 {centre}')
+    first = asked_about(tmp_path, 't,q1,q2,tau1,tau2', time, q, effort / (12.0, 30.0), urdf=urdf)
+    assert 'gain' in ''.join(first.questions)
+
+
+@pytest.mark.parametrize(('size', 'slow'), [(0.1, 0.05), (2.0, 0.0)])
+def test_a_torque_that_holds_no_model_is_a_question_and_no_other_unit(
+    size: float, slow: float, tmp_path: Path,
+) -> None:
     time, q, _, _ = run_of_arm()
-    noise = np.random.default_rng(1).normal(0, 0.1, q.shape)
+    noise = np.random.default_rng(1).normal(0, size, q.shape)
     first = asked_about(tmp_path, 't,q1,q2,tau1,tau2', time, q,
-                        noise + np.cumsum(noise, axis=0) / 20)
+                        noise + slow * np.cumsum(noise, axis=0))
     assert 'effort_kind: external' in ''.join(first.questions)
     assert 'position_scale' not in first.text
 

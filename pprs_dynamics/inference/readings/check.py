@@ -338,7 +338,8 @@ class Search:
         first = fit_of(np.ones(len(weights)), 0.0)
         fits = [first, *(fit_of(*row) for row in self._effort_rows(
             reading, evidence, measured, alone))]
-        if reading.kinds & {'position_offset', 'position_unit', 'mounting'}:
+        if {'position_offset', 'position_unit', 'mounting', 'load'} & {
+                part.kind for part in reading.parts}:
             # Another weight is credible only for efforts that show weight or inertia.
             fits = [fit for fit in fits if fit.mean_prior <= table.PLAUSIBLE]
         return fits
@@ -396,7 +397,7 @@ class Search:
         off = np.abs(np.log(sizes)) > same
         is_off = not reading.load and np.any(off) if self.is_first else (
             np.all(off) and len(known) >= min(2, len(factors)))
-        if is_off and np.all(sizes > table.LARGEST_COMPLIANCE) and not any(
+        if is_off and np.any(sizes > table.LARGEST_COMPLIANCE) and not any(
                 is_near(scale, known, table.NEARLY_KGF_CM if abs(scale) == table.KGF_CM else np.inf)
                 for scale in units if abs(scale) != 1):
             # Drives that show no factor of their own are recorded like the others.

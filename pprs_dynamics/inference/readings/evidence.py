@@ -282,8 +282,8 @@ class Shares:
     inertia, gravity : float
         Shares of the model's in the effort.
     inertia_doubt, gravity_doubt : float
-        By how much each changes if the whole residual is attributed to it; infinite where the
-        motion does not show it.
+        By how much each changes if the whole residual but its noise is attributed to it; infinite
+        where the motion does not show it.
     viscous, dry : float
         Friction, over the swing of the effort; the former with its sign.
     friction, friction_by_chance : float
@@ -320,9 +320,12 @@ class Shares:
             parts[1] = parts[1] + constant * ones
             alone, alone_doubts, _ = fitted(effort, parts)
             share, doubt = alone[1], alone_doubts[1]
+        # Fast noise averages out.
+        fast = noise * float(np.sqrt(count)) / max(residual, 1e-300) if noise < np.inf else 0.0
+        slow = float(np.sqrt(np.clip(1 - fast ** 2, table.CERTAIN ** 2 / count, 1.0)))
         viscous, dry = found[2] * parts[2], found[3] * parts[3]
         friction = float(np.linalg.norm(viscous + dry) * np.sign((viscous + dry) @ parts[2]))
-        return cls(found[0], doubts[0], share, doubt,
+        return cls(found[0], slow * doubts[0], share, slow * doubt,
                    float(np.sign(found[2]) * np.linalg.norm(viscous)) / swing,
                    float(np.linalg.norm(dry)) / swing, friction / swing,
                    residual * float(np.sqrt(2 / count)) / swing, residual / swing,

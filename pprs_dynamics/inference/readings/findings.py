@@ -385,7 +385,7 @@ def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence
         'not like a measurement',
         table.COMMAND: f'{lacks} what a controller commands, not like a measurement'}[kind]
     line = {table.COMMAND: recorded_names.COMMANDED, table.EXTERNAL: kind,
-            table.WITHOUT_GRAVITY: kind}.get(kind)
+            table.POSITION_ERROR: recorded_names.COMMANDED, table.WITHOUT_GRAVITY: kind}.get(kind)
     return NoMeasurement.of(kind, model.drives, group, what,
                             f'{EFFORT_KIND}: {line}' if line else '')
 

@@ -74,8 +74,8 @@ def mounting_in(model: DriveModel, excerpt: Excerpt, reading: Reading, same_size
         y = np.column_stack((effort[at], columns[at, d]))
         # What the drive's inertia, friction and offset do not explain.
         rest = y - own[at, d] @ np.linalg.lstsq(own[at, d], y, rcond=None)[0]
-        rest /= max(root_mean_square(rest[:, 0]), 1e-300)
-        if np.any(rest[:, 1:]):
+        if np.any(rest[:, 0]) and np.any(rest[:, 1:]):
+            rest /= root_mean_square(rest[:, 0])
             rows.append(rest[:, 1:])
             targets.append(rest[:, 0])
     if not rows:
