@@ -216,7 +216,7 @@ def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
     """Return a picture of the unexplained error over its variable."""
     noise = diagnosis.noise.get(statement.drive)
     return None if noise is None else along(
-        with_error(diagnosis.residuals, diagnosis.remaining), noise, statement, 'what remains')
+        with_error(diagnosis.residuals, diagnosis.remaining), noise, statement, 'residual')
 
 
 def over_time(residuals: Residuals, drive: int) -> Any:
@@ -272,11 +272,11 @@ def against_variables(residuals: Residuals, comparison: Comparison) -> list[tupl
 
 
 def _means(profile: Profile, variable: str, residuals: Residuals, drive: str,
-           meta: Any = None) -> Any:
+           meta: Any = None, name: str = 'mean', colour: str = charts.ERROR) -> Any:
     factor, unit = read_in(variable, residuals.units_of(variable.partition(' of ')[2] or drive))
     effort = charts.hover(residuals.units_of(drive))
     return charts.trace(
-        factor * middles(profile), profile.mean, 'mean', charts.ERROR, 2, mode='lines+markers',
+        factor * middles(profile), profile.mean, name, colour, 2, mode='lines+markers',
         meta=meta, marker={'size': 5},
         error_y=charts.deviations(profile.uncertainty),
         hovertemplate=f'%{{x:.4g}} {unit}: {effort}<extra></extra>')
@@ -305,15 +305,23 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     if statement.variable == 'frequency':
         return _line(residuals, noise, statement, what)
     variable = 'velocity' if statement.variable == 'direction' else statement.variable
-    profile = _profile(residuals, drive, variable, noise)
-    if profile is None:
+    parts = {'mean': residuals}
+    if statement.is_directed:
+        direction = residuals.variable('direction', drive)
+        assert direction is not None
+        parts = {name: replace(residuals, measured=np.where(
+            (sign * direction > 0)[:, None], residuals.measured, np.nan))
+            for name, sign in (('forward', 1), ('backward', -1))}
+    traces = [_means(profile, variable, residuals, statement.drive, None, name, colour)
+              for (name, part), colour in zip(parts.items(), (charts.ERROR, charts.MODEL),
+                                              strict=False)
+              if (profile := _profile(part, drive, variable, noise)) is not None]
+    if not traces:
         return None
     units = residuals.units_of(statement.drive)
     factor, label = axis_of(variable, residuals, statement.drive)
-    trace = _means(profile, variable, residuals, statement.drive)
-    figure = charts.figure([trace], 300, margin={**charts.MARGIN, 't': 15}, showlegend=False,
-                           xaxis_title=label,
-                           yaxis_title=f'mean {what} on {statement.drive} [{units.effort}]')
+    figure = charts.figure(traces, 300, showlegend=len(traces) > 1, xaxis_title=label, yaxis={
+        'title': f'mean {what}<br>on {statement.drive} [{units.effort}]', 'automargin': True})
     if statement.range is not None and statement.variable == variable:
         for sign in (1, -1) if statement.is_of_speed else (1,):
             low, high = sorted(sign * factor * end for end in statement.range)
@@ -336,8 +344,10 @@ def _profile(residuals: Residuals, drive: int, variable: str, noise: NoiseSpectr
 
 def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str) -> Any:
     unit = _power(residuals.units_of(statement.drive).effort)
-    figure = _over_frequency(_spectra(residuals, statement.drive, noise), 300,
-                             f'{what} on {statement.drive} [{unit}]')
+    # Drawn whichever drive the page's menu shows.
+    spectra = [trace.update(meta=None) for trace in _spectra(residuals, statement.drive, noise)]
+    figure = _over_frequency(spectra, 300,
+                             f'{what}<br>on {statement.drive} [{unit}]')
     if statement.range is not None:
         figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
                          fillcolor=charts.MARK, opacity=0.3, line_width=0)
@@ -362,7 +372,8 @@ def _over_frequency(traces: list[Any], height: int, title: str) -> Any:
         traces, height, hovermode='x unified',
         xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': title, 'exponentformat': 'e', 'dtick': 1})
+        yaxis={'type': 'log', 'title': title, 'exponentformat': 'e', 'dtick': 1,
+               'automargin': True})
 
 
 def _power(unit: str) -> str:

@@ -109,6 +109,11 @@ class Statement(JsonRecord):
         """Whether `range` is one of the speed, in either direction."""
         return is_of_speed(self.kind, self.variable)
 
+    @property
+    def is_directed(self) -> bool:
+        """Whether the pattern has the other sign in the other direction of motion."""
+        return self.kind.startswith('directed') and not self.variable.startswith('velocity')
+
 
 def word_statement(
     drive_patterns: DrivePatterns, candidate: UnknownCandidate, coefficients: Array,
