@@ -55,8 +55,8 @@ OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
               'position': SPRINGREF}
 OF_KEYS = {'friction.drives.viscous': DAMPING, 'friction.viscous': DAMPING,
            'friction.coulomb': FRICTION, 'robot.armature': ARMATURE}
-# By joint, the numbers that a format names.
-Joints = dict[str, dict[str, float]]
+# By joint and name in a format.
+Numbers = dict[tuple[str, str], float]
 
 
 def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
@@ -72,8 +72,8 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
     ModelError
         For bodies that no real ones are, and closures that no format has.
     """
-    joints: Joints = {}
-    left = [key for key, numbers in _of_model(model) if not _take(joints, numbers, HELD[kind])]
+    taken: Numbers = {}
+    left = [key for key, numbers in _of_model(model) if not _take(taken, numbers, HELD[kind])]
     # Joints of a format that passive joints of the model are; those without do not turn alone.
     passive = {joint.name: joint.joints for joint in model.robot.passive_joints
                if joint.has_position}
@@ -84,34 +84,28 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
         if _is_body(effect, kind, robot):
             assert isinstance(effect, BodyEffect)
             robot = effect.changed(robot)
-        elif not _take(joints, _of_effect(effect, passive), HELD[kind]):
+        elif not _take(taken, _of_effect(effect, passive), HELD[kind]):
             left.append(effect.name)
     if kind == URDF:
         if tuple(model.robot.gravity) != STANDARD_GRAVITY:
             left.append(next(key for key in ('gravity', 'robot.gravity') if key in model.values))
         robot = replace(robot, gravity=STANDARD_GRAVITY)
         left += [loop.name for loop in model.robot.structure.loops]
-    return described(ROBOT, robot, {
-        name: {key: value for key, value in numbers.items() if value}
-        for name, numbers in joints.items()}, tuple(left))
+    return described(ROBOT, robot, taken, tuple(left))
 
 
-def _take(joints: Joints, numbers: Joints | None, held: set[str]) -> bool:
-    """Add numbers to joints; False, with nothing added, where the format cannot hold them."""
-    if numbers is None:
-        return False
-    added = {name: {key: value + joints.get(name, {}).get(key, 0.0)
-                    for key, value in own.items() if value} for name, own in numbers.items()}
+def _take(taken: Numbers, numbers: Numbers | None, held: set[str]) -> bool:
+    """Add numbers to others; False, with nothing added, where the format cannot hold them."""
+    added = {key: value + taken.get(key, 0.0) for key, value in (numbers or {}).items() if value}
     # No simulator takes a joint that gives power without end.
-    if any(key not in held or (value < 0 and key != SPRINGREF)
-           for own in added.values() for key, value in own.items()):
+    if numbers is None or any(name not in held or (value < 0 and name != SPRINGREF)
+                              for (_, name), value in added.items()):
         return False
-    for name, own in added.items():
-        joints.setdefault(name, {}).update(own)
+    taken.update(added)
     return True
 
 
-def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
+def _of_model(model: DriveModel) -> Iterator[tuple[str, Numbers | None]]:
     """Yield keys of rotors and friction, also of passive joints; None for those of no format.
 
     No format has loads that friction follows.
@@ -120,10 +114,10 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
     for key, number in OF_KEYS.items():
         if key in values:
             numbers = np.broadcast_to(np.asarray(values[key], dtype=float), len(model.drives))
-            yield key, {drive: {number: value} for drive, value in zip(
+            yield key, {(drive, number): value for drive, value in zip(
                 model.drives, numbers.tolist(), strict=True)}
     if viscous := values.get('friction.revolute.viscous'):
-        yield 'friction.revolute.viscous', {name: {DAMPING: viscous} for name in HINGES}
+        yield 'friction.revolute.viscous', {(name, DAMPING): viscous for name in HINGES}
     for key in ('friction.offset', 'friction.drives.coulomb', *(
             f'friction.{joint}.coulomb' for joint in ('revolute', 'spherical')
             if values.get(f'friction.{joint}.diameter')), 'friction.spherical.viscous'):
@@ -136,25 +130,25 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Joints | None]]:
         name, _, parameter = key.removeprefix(JOINTS).rpartition('.')
         if key.startswith(JOINTS) and parameter != 'radius' and value:
             of_passive = None if name in loops else OF_PASSIVE.get(parameter)
-            yield key, None if of_passive is None else {name: {of_passive: value}}
+            yield key, None if of_passive is None else {(name, of_passive): value}
 
 
-def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Joints | None:
+def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Numbers | None:
     """Return the numbers of an effect in drives or passive joints, None where it has others."""
     if isinstance(effect, DriveEffect) and type(effect) in OF_DRIVES:
         names = OF_DRIVES[type(effect)]
-        return {drive: {names[key]: value for key, value in values.items()}
-                for drive, values in effect.drives.items()}
+        return {(drive, names[key]): value for drive, values in effect.drives.items()
+                for key, value in values.items()}
     if not isinstance(effect, (JointFrictionEffect, JointSpring)):
         return None
-    joints: Joints = {}
+    numbers: Numbers = {}
     for key, value in effect.values.items():
         joint, _, parameter = key.rpartition('.')
         if value and (joint not in passive or parameter not in OF_PASSIVE):
             return None
         for name in passive.get(joint, ()) if value else ():
-            joints.setdefault(name, {})[OF_PASSIVE[parameter]] = value
-    return joints
+            numbers[name, OF_PASSIVE[parameter]] = value
+    return numbers
 
 
 def _is_body(effect: Effect, kind: str, robot: Any) -> bool:
@@ -232,8 +226,8 @@ class ExportedRobot:
     ----------
     name : str
     mechanism : Mechanism
-    joints : mapping of str to mapping of str to float
-        Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
+    numbers : mapping of (str, str) to float
+        By joint and name: `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
         it has them.
     bodies : tuple of Body
         Each before what hangs on it, as they stand in MJCF.
@@ -243,9 +237,13 @@ class ExportedRobot:
 
     name: str
     mechanism: Mechanism
-    joints: Mapping[str, Mapping[str, float]]
+    numbers: Mapping[tuple[str, str], float]
     bodies: tuple[Body, ...]
     not_expressed: tuple[str, ...]
+
+    def of_joint(self, joint: str) -> dict[str, float]:
+        """Return the numbers of a joint by name."""
+        return {name: value for (of, name), value in self.numbers.items() if of == joint}
 
     @property
     def frames(self) -> Iterator[tuple[str, int, Frame]]:
@@ -257,10 +255,10 @@ class ExportedRobot:
                 yield name, row, frame
 
 
-def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
+def described(name: str, mechanism: Mechanism, numbers: Mapping[tuple[str, str], float] = {},
               not_expressed: tuple[str, ...] = ()) -> ExportedRobot:
     """Return a mechanism as files of simulators describe it; see `ExportedRobot`."""
-    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)), not_expressed)
+    return ExportedRobot(name, mechanism, numbers, tuple(_bodies(mechanism)), not_expressed)
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -449,7 +447,7 @@ def _mjcf(robot: ExportedRobot) -> Element:
             _add(own, 'freejoint', name=body.joint.name)
         else:
             _add(own, 'joint', name=body.joint.name, type=body.kind, axis=body.axis,
-                 range=body.limits, **robot.joints.get(body.joint.name, {}))
+                 range=body.limits, **robot.of_joint(body.joint.name))
         for point in drawn[body.row]:
             _add(own, 'geom', type='capsule', fromto=(0, 0, 0, *point), size=width / 2,
                  contype='0', conaffinity='0', group='1')
@@ -543,7 +541,7 @@ def _urdf_joint(root: Element, robot: ExportedRobot, body: Body, parent: str) ->
     speed, effort = (value if math.isfinite(value) else UNLIMITED
                      for value in (said.speed, said.effort))
     _add(joint, 'limit', lower=lower, upper=upper, velocity=speed, effort=effort)
-    if numbers := robot.joints.get(said.name, {}):
+    if numbers := robot.of_joint(said.name):
         _add(joint, 'dynamics', damping=numbers.get(DAMPING, 0.0),
              friction=numbers.get(FRICTION, 0.0))
     for leader, ratio, offset in mimic:
