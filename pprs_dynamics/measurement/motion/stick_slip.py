@@ -107,21 +107,19 @@ def _within(time: Array, position: Array, effort: Array, step: float, window: fl
              if np.all(direction[a:b] == direction[a]) and np.all(moving[a:b])]
     if len(pairs) < LEAST_SLIPS:
         return None
-    periods = np.array([(b - a) * step for a, b in pairs])
+    a, b = np.array(pairs).T
+    periods = (b - a) * step
     period = float(np.median(periods))
     if np.median(np.abs(periods - period)) > REGULAR * period / 2 or period > window * 1.5:
         return None
-    rises, falls, travels, stood = [], [], [], []
-    for a, b in pairs:
-        end = a + int(np.argmax(stuck[a:b]))  # where the slip ends
-        rises.append((level[b - 1] - level[min(end, b - 1)]) * direction[a])
-        falls.append((level[min(end, b - 1)] - level[a]) * direction[a])
-        travels.append(abs(at[b] - at[a]))
-        stood.append(np.mean(np.abs(at[a:b] - at[b - 1]) < STANDING * travels[-1]))
+    ends = np.array([first + np.argmax(stuck[first:last]) for first, last in pairs])  # of slips
+    rises, falls = ((level[to] - level[of]) * direction[a] for of, to in ((ends, b - 1), (a, ends)))
+    travels = np.abs(at[b] - at[a])
+    stood = [np.mean(np.abs(at[first:last] - at[last - 1]) < STANDING * travel)
+             for first, last, travel in zip(a, b, travels, strict=True)]
     travel = float(np.median(travels))
     if (not np.median(rises) > 0 > np.median(falls) or np.median(stood) < LEAST_STUCK
             or not LEAST_STEP * quantum < travel < LARGEST_STEP * np.ptp(position)):
         return None
-    speed = float(np.quantile(np.array(travels) / periods, FASTEST))
-    covered = sum(b - a for a, b in pairs)
-    return StickSlip(1 / period, speed, travel, len(pairs), float(covered / len(time)))
+    speed = float(np.quantile(travels / periods, FASTEST))
+    return StickSlip(1 / period, speed, travel, len(pairs), float(np.sum(b - a) / len(time)))
