@@ -43,7 +43,7 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 # until it brings a share of what it promises (Armijo), or is shorter than the least.
 CONVERGED, MOST_STEPS, SUFFICIENT, LEAST_STEP = 1e-4, 30, 1e-4, 1e-4
 # Sweeps over the amplitudes in a step, and fall of -2 ln of the likelihood that ends them.
-MOST_SWEEPS, LEAST_FALL = 1000, 1e-9
+MOST_SWEEPS, LEAST_FALL = 3000, 1e-12
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Exponents s of noise that goes on below the record, the prior odds of each against one corner, and
 # how far down S of a constant is taken. Share of constants beyond three standard deviations where
