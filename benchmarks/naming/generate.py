@@ -214,10 +214,15 @@ def _residuals(model: DriveModel, time: Array, position: Array, effort: Array) -
 
 
 def _added(with_effects: Residuals, plain: Residuals) -> Array:
-    """Return what effects add to the error, (M, D), where both are known: rests may differ."""
-    both = [np.isin(run.time, other.time) for run, other in (
-        (with_effects, plain), (plain, with_effects))]
-    return np.asarray(with_effects.error[both[0]] - plain.error[both[1]])
+    """Return what effects add to the error at their times, (M, D); NaN where not both are known.
+
+    Rests may differ, and with them the times of the samples: the nearest one counts.
+    """
+    after = np.clip(np.searchsorted(plain.time, with_effects.time), 1, len(plain) - 1)
+    middle = (plain.time[after - 1] + plain.time[after]) / 2
+    nearest = np.where(with_effects.time < middle, after - 1, after)
+    far = np.abs(plain.time[nearest] - with_effects.time) > 0.6 * plain.period
+    return np.where(far[:, None], np.nan, with_effects.error - plain.error[nearest])
 
 
 def _wave(draw: Draw, position: Array) -> Array:
