@@ -86,14 +86,13 @@ class Window:
         Begin and end [s], on the stream's clock.
     diagnosis : dict
         JSON of `pprs diagnose`.
-    adopted, plain : DriveModel
-        The model with its fitted numbers, with the reported effects and without them.
+    adopted : DriveModel
+        The model with its fitted numbers and the reported effects.
     """
 
     span: tuple[float, float]
     diagnosis: Mapping[str, Any]
     adopted: DriveModel
-    plain: DriveModel
 
 
 @dataclass(frozen=True)
@@ -190,7 +189,7 @@ class LiveDiagnosis(JsonRecord):
             return replace(self, withdrawn=(), note='the robot hardly moves: no diagnosis')
         answer = diagnose(self.model, [recording], reference=self.reference)
         window = Window((start, start + float(recording.time[-1] - recording.time[0])),
-                        answer.to_dict(), answer.adopted, without_found(self.model, answer))
+                        answer.to_dict(), answer.adopted)
         holds, effects = self._holds(recording), []
         for found in answer.effects:
             begun = None if self.last is None else start
@@ -208,23 +207,9 @@ class LiveDiagnosis(JsonRecord):
                        withdrawn=() if holds else tuple(missed))
 
     def _holds(self, recording: Recording) -> bool:
-        """Return whether the model of the last window predicts a recording better.
-
-        Than the input model, and than the model with the fitted numbers alone.
-        """
+        """Return whether the model of the last window predicts a recording better."""
         if self.last is None or not self.effects:
             return False
-        after, _ = measure_residuals(self.last.adopted, [recording])
-        return all(
-            predictive_gain(measure_residuals(model, [recording])[0], after).confirms
-            for model in (self.model, self.last.plain))
-
-
-def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
-    """Return the model of a diagnosis without its effects, with its fitted numbers."""
-    found = {effect.name for effect in answer.effects}
-    given = {effect.name: effect for effect in model.effects}
-    return replace(answer.adopted, effects=tuple(
-        given.get(effect.name, effect) if effect.name in found else effect
-        for effect in answer.adopted.effects
-        if effect.name not in found or effect.name in given))
+        before, after = (measure_residuals(model, [recording])[0]
+                         for model in (self.model, self.last.adopted))
+        return predictive_gain(before, after).confirms
