@@ -320,13 +320,11 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
         fits, rest = row.fits, row.fitted.without(found)
     design, scan = fits.design, Scan(fits)
     offers = scan.offers(fits.evaluate(rest)).get(request.effect, [])
-    if request.drives is None:
-        chosen = scan.best_drives(request.effect, offers, None)[1] if offers else []
+    if request.drives is not None:
+        wanted = set(map(design.drives.index, request.drives))
+        chosen = [component for _, component in offers if component.drive in wanted]
     else:
-        wanted = {design.drives.index(name) for name in request.drives}
-        kept = [c for c in found.components if c.drive in wanted] if found else []
-        wanted -= {component.drive for component in kept}
-        chosen = [*kept, *(component for _, component in offers if component.drive in wanted)]
+        chosen = scan.best_drives(request.effect, offers, None)[1] if offers else []
     if len(chosen) < len(request.drives or (None,)):
         standing = [name for name in request.drives or design.drives
                     if not design.moves(design.drives.index(name))]
