@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +26,8 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LEAST_DIFFERENCE = 4.0  # whitened square by which the exact model may differ from the linear one
+LEAST_CHANGE = 2.0  # of a cost, for which a set is fitted anew
+NEARLY = 0.02  # scales of a shape by which it may differ from that of the columns
 MOST_STEPS, MOST_HALVINGS = 6, 4
 
 
@@ -99,6 +101,18 @@ def squared(fits: FittedSets, fitted: CandidateSet, forces: Array) -> float:
     return total
 
 
+def misfit(fits: FittedSets, fitted: CandidateSet, forces: Array) -> float:
+    """Return the whitened squares of the residual with other forces (M, D) than the linear ones.
+
+    What a fit explains by columns that are in no model stays explained.
+    """
+    more, total = np.nan_to_num(linear_prediction(fits, fitted) - forces), 0.0
+    for d, series in fits.regression.series.items():
+        left = fits.regression.remaining(fitted.fit, d) + series.transform(more[:, d])
+        total += float(left ** 2 @ series.spread(fits.regression.weights(fitted.fit, d)))
+    return total
+
+
 def linear_prediction(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return the forces that the linear fit predicts, reversals as the model has them, (M, D)."""
     design = fits.design
@@ -140,7 +154,8 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
 def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
     """Return a set around its own fitted model, and the fitted sets that it is one of.
 
-    Gauss-Newton steps with the effects of the set, each halved until the exact error falls. The
+    Gauss-Newton steps with the effects of the set, each halved until the exact misfit falls, until
+    the cost stands still: around a delay the columns of all other effects are late, too. The
     arguments are returned where nothing changes.
 
     Raises
@@ -149,20 +164,24 @@ def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, Cand
         For values that no model may have.
     """
     fitted = fits.refined(fitted)
+    change = np.inf
     for _ in range(MOST_STEPS):
-        point = next_operating_point(fits, fitted)
+        point = next_operating_point(fits, fitted, change)
         if point is None:
             break
-        fits = fits.around(point, alone=True)
+        before, fits = fitted.total, fits.around(point, alone=True)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
+        change = abs(fitted.total - before)
     return fits, fitted
 
 
-def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoint | None:
-    """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
+def next_operating_point(fits: FittedSets, fitted: CandidateSet, change: float = np.inf,
+                         ) -> OperatingPoint | None:
+    """Return where to expand next: towards a set's fitted model, as far as the exact misfit falls.
 
-    None where no step lowers the exact error, or where the exact forces of the fitted model are
-    those of the linear fit and columns were computed with every nonlinear effect.
+    None where no step lowers it, or where the exact forces of the fitted model are those of the
+    linear fit and columns were computed with every nonlinear effect. Its shape must then be
+    nearly the same, or the cost have stood still around the last point.
     """
     design = fits.design
     base, effects = parts_of(fits, fitted)
@@ -173,13 +192,12 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
         (effect.effect, effect.drive) in known for effect in effects)
     if not (is_around or is_known):
         return OperatingPoint(target, base, effects)  # whatever the exact forces are
-    measured, exact = fits.regression.residuals.measured, design.exact_forces(target)
-    if is_around and squared(
+    exact = design.exact_forces(target)
+    if is_around and (change < LEAST_CHANGE or _has_nonlinear(before, effects, NEARLY)) and squared(
             fits, fitted, exact - linear_prediction(fits, fitted)) < LEAST_DIFFERENCE:
         return None
     if before is not None and is_known:
-        loss = squared(fits, fitted, measured - exact)
-        reached = squared(fits, fitted, measured - design.forces)
+        loss, reached = (misfit(fits, fitted, forces) for forces in (exact, design.forces))
         for _ in range(MOST_HALVINGS):
             if loss < reached:
                 break
@@ -187,7 +205,7 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
             effects = tuple(_between(known[effect.effect, effect.drive], effect)
                             for effect in effects)
             target = model_at(design, base, effects)
-            loss = squared(fits, fitted, measured - design.exact_forces(target))
+            loss = misfit(fits, fitted, design.exact_forces(target))
         else:
             return None
     return OperatingPoint(target, base, effects)
@@ -198,16 +216,20 @@ def has_nonlinear(fits: FittedSets, fitted: CandidateSet) -> bool:
     return _has_nonlinear(fits.design.point, parts_of(fits, fitted)[1])
 
 
-def _has_nonlinear(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
+def _has_nonlinear(point: OperatingPoint | None, effects: Sequence[PlacedEffect],
+                   scales: float = 1.0) -> bool:
     """Return whether a point has the nonlinear ones of some effects, nearly of the same shapes."""
     known = {(effect.effect, effect.drive): effect for effect in point.effects} if point else {}
     return all((effect.effect, effect.drive) in known and all(
-        abs(effect.shape[p.name] - known[effect.effect, effect.drive].shape[p.name]) <= p.scale
-        for p in effect.effect.parameters if p.name in effect.shape)
+        abs(effect.shape[p.name] - known[effect.effect, effect.drive].shape[p.name])
+        <= scales * p.scale for p in effect.effect.parameters if p.name in effect.shape)
         for effect in effects if effect.effect.nonlinear)
 
 
 def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
-    return replace(b, coefficients={
-        name: (a.coefficients.get(name, 0.0) + value) / 2
-        for name, value in b.coefficients.items()})
+    """Return the second effect with the means of both effects' coefficients and shapes."""
+    def means(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+        return {name: (first.get(name, 0.0) + value) / 2 for name, value in second.items()}
+
+    return replace(b, coefficients=means(a.coefficients, b.coefficients),
+                   shape=means(a.shape, b.shape))

@@ -27,6 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.courses import fit_courses, fit_curves
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import (
+    LEAST_CHANGE,
     fitted_model,
     has_nonlinear,
     linear_prediction,
@@ -42,7 +43,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_STEPS = 6  # of relinearisation of one row
 MOST_EXACT = 4  # rows of one search that get exact costs
-LEAST_CHANGE = 2.0  # of a cost, for which a row is computed anew
 
 
 @dataclass(frozen=True, eq=False)
