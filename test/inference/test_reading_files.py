@@ -282,9 +282,8 @@ def test_amperes_and_shares_of_an_unknown_effort_are_a_question(
 
 
 @pytest.mark.parametrize(('mass', 'centre'), [(1.5, 0.375), (3.75, 0.24)])
-def test_amperes_are_a_question_with_other_masses(
-    mass: float, centre: float, tmp_path: Path,
-) -> None:
+def test_amperes_are_a_question_with_other_masses(mass: float, centre: float,
+                                                  tmp_path: Path) -> None:
     time, q, _, effort = run_of_arm()
     urdf = ARM.replace('"3.0"', '"4.8"').replace('"1.5"', f'"{mass}"').replace(
         '0 0 0.15', f'0 0 {centre}')
