@@ -549,7 +549,7 @@ def _joint_friction(run: Injection) -> Injected:
     closed = run.engine.closed(run.motion)
 
     def rows_of(name: str) -> Array:
-        return run.engine.friction(run.model.robot.friction_table(
+        return run.engine.friction(run.model.robot.tree_friction(
             {name: {}}, run.model.reversal), closed, run.plain.carried).rows
 
     def speed_of(rows: Array) -> Array:
@@ -845,7 +845,7 @@ def own_joint_friction(model: DriveModel) -> JointFriction:
     of_drives = {drive: dict(zip(('viscous', 'torque', 'coulomb'), numbers, strict=True))
                  for drive, *numbers in zip(model.drives, *rows, strict=True)}
     return JointFriction(*map(np.concatenate, zip(*(
-        model.robot.friction_table(blocks, model.reversal) for blocks in (of_drives, *(
+        model.robot.tree_friction(blocks, model.reversal) for blocks in (of_drives, *(
             effect.blocks for effect in model.effects if isinstance(effect, ModelJointFriction)))),
         strict=True)))
 

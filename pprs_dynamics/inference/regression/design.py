@@ -155,9 +155,10 @@ class Design:
         progress : callable, optional
             Called with the share that is done.
         """
-        report = progress or (lambda share: None)
+        report, parts = progress or (lambda share: None), 2 * len(recordings)
         design = cls._evaluated(model, model, tuple(
-            reconstruct(model, recording) for recording in recordings), report)
+            reconstruct(model, recording, progress_of(report, k, parts))
+            for k, recording in enumerate(recordings)), report)
         design._drop_unknown_past()
         return design
 
@@ -322,7 +323,7 @@ class Design:
         for k, reconstruction in enumerate(reconstructions):
             collector = ColumnCollector(sensitivities, reconstruction)
             tables.append(treated_table(model, reconstruction, progress_of(
-                report, k, len(reconstructions)), collector))
+                report, len(reconstructions) + k, 2 * len(reconstructions)), collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = {**known, **stacked_columns(tables)}

@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.keys import GAIN
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
 # Of slow columns, see `Samples`; friction of a closed form turns where loads change sign.
-NODES_PER_PERIOD, GUIDE_NODES = 40, 120
+NODES_PER_PERIOD, CLOSED_FORM_NODES = 40, 120
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
@@ -175,12 +175,13 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
+        is_closed_form = not self.model.moves_joints
         slow = samples = Samples.of(
             state, treat, [effect for effect in self.model.effects
                            if isinstance(effect, MeasurementEffect)],
-            GUIDE_NODES if state.robot.has_guides else NODES_PER_PERIOD)
-        if state.robot.has_guides:
-            # Friction follows the loads of the guides: splines would be 1 % off.
+            CLOSED_FORM_NODES if is_closed_form else NODES_PER_PERIOD)
+        if is_closed_form:
+            # Friction follows the loads of the closed form: splines would be 1 % off.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
         columns: dict[str, Array] = {}
         if NUMBERS not in self.known:
@@ -311,7 +312,7 @@ class Sensitivities:
         if number.key.startswith('friction.'):
             found = state.with_smoothing(moved.reversal)
         elif number.key.startswith('geometry.'):  # with it friction turns over at other times
-            found = self._at(moved, moved.mechanism(state))
+            found = self._at(moved, moved.at_drives(state))
         else:
             state = samples.nodes
             return samples.interpolated([self._efforts(moved, self._at(moved, state))
@@ -343,7 +344,7 @@ class Sensitivities:
         present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
-            if self.is_planned and not self.model.robot.has_guides:
+            if self.is_planned and self.model.moves_joints:
                 return self._of_rigid_bodies(effect, state)
         if effect not in self._steps:
             values = {} if present is None else effect.to_coefficients(present.values)

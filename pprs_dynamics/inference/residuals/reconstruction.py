@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MotionError, WorkspaceError
+from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import (
@@ -32,6 +32,7 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import QUANTITIES, PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
+Motion = PlatformMotion | JointMotion
 MOTION = ('position', 'velocity', 'acceleration')
 
 
@@ -48,7 +50,7 @@ class Chunk:
 
     Parameters
     ----------
-    motion : JointMotion
+    motion : PlatformMotion or JointMotion
         With times.
     samples, blocks : slice
         Its place in the reconstruction, before and after treatment.
@@ -58,7 +60,7 @@ class Chunk:
         For these samples alone.
     """
 
-    motion: JointMotion
+    motion: Motion
     samples: slice
     blocks: slice
     is_start: bool
@@ -67,12 +69,14 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Reconstruction(DriveMotion):
-    """Motion of the drives with effort; N samples, and M blocks of them.
+    """Motion of the drives and what they move, with effort; N samples, and M blocks of them.
 
     Parameters
     ----------
     time : (N,) array
         [s].
+    motion : PlatformMotion or JointMotion
+        Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
         As measured [N]; NaN where it was not, where a drive stands whose effort then means
         nothing, and where it is late and of motion before its segment.
@@ -95,6 +99,7 @@ class Reconstruction(DriveMotion):
     """
 
     time: Array
+    motion: Motion
     effort: Array
     treat: Treatment
     gain: Array
@@ -106,11 +111,6 @@ class Reconstruction(DriveMotion):
 
     def __len__(self) -> int:
         return len(self.time)
-
-    @property
-    def motion(self) -> JointMotion:
-        """The motion without times, which need not increase from segment to segment."""
-        return JointMotion(self.position, self.velocity, self.acceleration)
 
     def recorded_share(self, model: DriveModel) -> Array:
         """Return by what a model's efforts are multiplied to be those of the recording, (D,).
@@ -158,20 +158,65 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:
+def motion_of_drives(model: DriveModel, time: Array, drives: DriveMotion,
+                     progress: Progress | None = None) -> Motion:
+    """Return the motion, without times, that belongs to one of the drives.
+
+    Parameters
+    ----------
+    model : DriveModel
+    time : (N,) array
+        [s].
+    drives : DriveMotion
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+
+    Raises
+    ------
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    parts: list[Any] = []
+    for segment in drives.segments:
+        closed: dict[Any, Array] = {}
+        for start in range(segment.start, segment.stop, CHUNK):
+            rows = slice(start, min(start + CHUNK, segment.stop))
+            try:
+                parts.append(model.robot.motion_of_drives(
+                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows],
+                    closed))
+            except ConvergenceError as error:
+                sample = start + error.sample
+                raise ConvergenceError(
+                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
+                    error.rule) from None
+            if progress is not None:
+                progress(rows.stop, len(time))
+    kind = type(parts[0])
+    names = QUANTITIES if kind is PlatformMotion else MOTION
+    motion: Motion = kind(*(np.concatenate([getattr(part, name) for part in parts])
+                            for name in names))
+    return motion
+
+
+def reconstruct(
+    model: DriveModel, recording: Recording, progress: Progress | None = None,
+) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
     model : DriveModel
     recording : Recording
+    progress : callable, optional
+        Called with (samples done, all) now and then.
 
     Raises
     ------
     MotionError
         Where no segment is long enough, or the drives are not the model's.
-    WorkspaceError, SingularityError
-        Of a model whose encoders err by loads, see `DriveModel.drive_forces`.
+    ConvergenceError
+        Where drive positions do not close the mechanism.
     """
     names = model.drives
     if tuple(recording.drives) != names:
@@ -183,7 +228,7 @@ def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
-    drives = _followed_rightly(model, recording, read, windup)
+    drives, motion = _followed_rightly(model, recording, read, time, windup, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short']
@@ -196,7 +241,7 @@ def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:
     drives = replace(drives, notes=tuple(notes))
     gain = np.full(len(names), np.nan) if recording.gain is None else recording.gain
     return Reconstruction(
-        **vars(drives), time=time, effort=effort,
+        **vars(drives), time=time, motion=motion, effort=effort,
         treat=Treatment(drives.block_starts, total), gain=gain,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup).with_known_past(model.lateness)
@@ -209,13 +254,15 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
 
     Raises
     ------
-    WorkspaceError, SingularityError
-        See `reconstruct`.
+    ConvergenceError
+        Where drive positions do not close the mechanism.
     """
-    drives = _followed_rightly(model, reconstruction.recorded, reconstruction.read,
-                               reconstruction.windup)
+    drives, motion = _followed_rightly(
+        model, reconstruction.recorded, reconstruction.read, reconstruction.time,
+        reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
-                   acceleration=drives.acceleration, smoothing=drives.smoothing)
+                   acceleration=drives.acceleration, smoothing=drives.smoothing,
+                   motion=motion)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
@@ -248,30 +295,32 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
     return found[0] + smoothed[0], found[1] + smoothed[1], found[2] + smoothed[2]
 
 
-def _followed_rightly(model: DriveModel, recording: Recording, read: DriveMotion,
-                      windup: Array | None) -> DriveMotion:
-    """Return the true motion of the drives behind that which was read."""
+def _followed_rightly(
+    model: DriveModel, recording: Recording, read: DriveMotion, time: Array,
+    windup: Array | None, progress: Progress | None = None,
+) -> tuple[DriveMotion, Motion]:
+    """Return the true motion of the drives, and of what they move, behind that which was read."""
     if not model.position_effects:
-        return read
+        return read, motion_of_drives(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.position_effects, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
     if np.any(q_dot) and not all(effect.is_of_position for effect in model.position_effects):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
+    followed = motion_of_drives(model, time, drives, progress)
     if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
-        return drives
-    followed = JointMotion(drives.position, drives.velocity, drives.acceleration)
+        return drives, followed
     # Loads hardly change by what they do to positions: one step is enough.
     load = np.concatenate([
         model.mechanism(followed[start:start + CHUNK]).transmitted
-        for start in range(0, len(followed), CHUNK)])
+        for start in range(0, len(time), CHUNK)])
     drives = replace(drives, position=drives.position - model.loaded_position_error(load))
     if windup is not None:
         q, q_dot, q_ddot = model.windup_error(load, windup)
         drives = replace(drives, position=drives.position - q, velocity=drives.velocity - q_dot,
                          acceleration=drives.acceleration - q_ddot)
-    return drives
+    return drives, motion_of_drives(model, time, drives, progress)
 
 
 def _windup(recording: Recording, read: DriveMotion) -> Array | None:
@@ -324,13 +373,7 @@ def measured_forces(
     for chunk in reconstruction.chunks():
         if chunk.is_start:
             state = model.initial_state(reconstruction.start)
-        try:
-            forces = model.measured(model.drive_forces(chunk.motion, state), state)
-        except WorkspaceError as error:
-            sample = chunk.samples.start + error.sample
-            raise type(error)(
-                int(reconstruction.index[sample]),
-                f'at {reconstruction.time[sample]:.6g} s {error.found}', error.rule) from None
+        forces = model.measured(model.drive_forces(chunk.motion, state), state)
         yield chunk, forces, {name: values * share for name, values in {
             **forces.parts, 'total': forces.total}.items()}
 

@@ -72,8 +72,7 @@ class LinkMotion:
         rows, failed = structure.evaluation.forward_kinematics(
             position, velocity, acceleration, start, nearby)
         if failed >= 0:
-            raise WorkspaceError(failed, 'the loops do not close for drives at '
-                                 f'{np.round(position[failed], 6).tolist()}',
+            raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
                                  'must be within reach, on the way from home')
         found = cls(structure, rows)
         if len(structure.tables.passive):
@@ -319,7 +318,8 @@ class ToolPose:
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
             rows[:, self._drives].copy() for rows in (found.q, found.v, found.a))
-        return (JointMotion(position, velocity, acceleration, motion.time),
+        return (JointMotion(position, velocity, acceleration, motion.time,
+                            channels=motion.channels),
                 found.q[:, self._own])
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:

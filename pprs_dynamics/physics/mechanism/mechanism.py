@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -42,8 +42,6 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
     EFFORTS,
     FORCES,
-    GUIDE,
-    LOAD,
     MOTION,
     NO_FRICTION,
     RIGID,
@@ -169,13 +167,14 @@ class Mechanism:
         """Mass of all bodies [kg]."""
         return float(self.masses.sum())
 
-    def joints_of(self, name: str) -> tuple[str, ...]:
-        """Return the joints of the tree that have a name, or share one."""
-        return next((joint.joints for joint in self.passive_joints if joint.name == name), (name,))
-
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                       is_own: bool = False) -> Any:
+        """Return friction of joints as `MechanismState.friction_efforts` takes it."""
+        return self.tree_friction(blocks, reversal)
+
+    def tree_friction(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                       ) -> JointFriction:
-        """Return friction of joints as `MechanismState.friction_efforts` takes it.
+        """Return friction of joints of the tree.
 
         Parameters
         ----------
@@ -185,8 +184,8 @@ class Mechanism:
         reversal : Reversal
             In drives by their velocity, in all others by their rate, or that of slides.
         """
-        structure = self.structure
-        blocks = {joint: block for name, block in blocks.items() for joint in self.joints_of(name)}
+        structure, of = self.structure, {joint.name: joint.joints for joint in self.passive_joints}
+        blocks = {joint: block for name, block in blocks.items() for joint in of.get(name, (name,))}
         widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
                           strict=True))
         rows = structure.friction_rows
@@ -256,12 +255,7 @@ class Mechanism:
         structure = self.structure
         return SLIDE if structure.kinds == (PRISMATIC,) and not structure.loops else MECHANISM
 
-    # Whether drives rub under the load across their guides, else under that of their gears; and
-    # whether motions are planned and commanded as poses of the platform, else as those of drives.
-    has_guides: ClassVar[bool] = False
-    plans_poses: ClassVar[bool] = False
-
-    @cached_property
+    @property
     def motions(self) -> tuple[type, ...]:
         """Kinds of motion that have forces: of the drives, and of the tool where it has loops."""
         return (JointMotion, PlatformMotion) if self.structure.loops else (JointMotion,)
@@ -288,10 +282,10 @@ class Mechanism:
         """
         return ToolPose(self.structure)
 
-    def drive_motion(self, motion: PlatformMotion, closed: dict[Any, Array] | None = None,
-                     ) -> tuple[JointMotion, Array]:
-        """Return the motion of the drives for that of the tool; see `ToolPose.drives`."""
-        return self.tool_pose.drives(motion, closed)
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         closed: dict[Any, Array] | None = None) -> Any:
+        """Return the motion of the drives; loops are closed where forces are evaluated."""
+        return JointMotion(position, velocity, acceleration)
 
     def at_home(self, samples: int) -> Any:
         """Return the drives at rest where the description has them, one sample a second."""
@@ -304,15 +298,15 @@ class Mechanism:
               found: InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
         closed = {} if closed is None else closed
-        start, nearby = None, closed.get(self.structure)
+        start, nearby, pose = None, closed.get(self.structure), None
         if isinstance(motion, PlatformMotion):
             # The assembly is that of the pose, whichever the same drives would find from home.
-            nearby, (motion, start) = None, self.drive_motion(motion, closed)
+            pose, nearby = motion, None
+            motion, start = self.tool_pose.drives(motion, closed)
         state = MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
                                channels=motion.channels, robot=self, reversal=reversal,
-                               start=start, nearby=nearby, friction=friction)
+                               start=start, nearby=nearby, friction=friction, motion=pose)
         if found is not None:
-            found = found if found.q is not None else found._replace(q=start)
             vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
         return state
 
@@ -320,6 +314,11 @@ class Mechanism:
         """Store the coordinates of the last sample, near which the next loops close."""
         if len(state) and self.structure.loops:
             closed[self.structure] = state.closed[-1].copy()
+
+    def tree_motion(self, state: MechanismState) -> LinkMotion:
+        """Return the motion of the links of the tree in a state."""
+        links: LinkMotion = state.links
+        return links
 
     def kinematics(self, state: MechanismState) -> Any:
         """Return the motion of all links in a state."""
@@ -330,10 +329,6 @@ class Mechanism:
 
     def loads(self, links: Any, load: StructureLoad | None) -> Any:
         """Return the frictionless loads of joints and closures."""
-        if load is not None:
-            load = StructureLoad(load.wrench, {
-                joint: row for name, torque in load.torques.items() for joint, row in zip(
-                    self.joints_of(name), np.atleast_2d(torque.T), strict=True)})
         return links.loads(self.by_joint, self.gravity_row, load)
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
@@ -344,17 +339,12 @@ class Mechanism:
 
     def friction_parameters(self, joints: Any, drives: Array | None = None) -> Any:
         """Return friction of joints, and of drives (OF_DRIVE, D) or none, for `one_pass`."""
-        drives = np.array(self.structure.evaluation.no_actuators if drives is None else drives)
-        if self.has_guides:
-            drives[GUIDE] = self._drive_rows
-        return np.array(joints), drives
-
-    @cached_property
-    def _drive_rows(self) -> list[int]:
-        return [self.structure.rows[name] for name in self.drives]
+        return np.array(joints), self.structure.evaluation.no_actuators if (
+            drives is None) else drives
 
     def one_pass(self, motion: Any, parameters: Any, closed: dict[Any, Array] | None,
-                 start: Array | None = None) -> InverseDynamicsResult | None:
+                 has_state: bool = False, start: Array | None = None,
+                 ) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
@@ -366,6 +356,8 @@ class Mechanism:
             See `friction_parameters`.
         closed : dict of Structure to array, optional
             See `ModelState`.
+        has_state : bool
+            Whether the state for the motion is made next from the result.
         start : (N, C) array, optional
             See `Evaluation.forward_kinematics`.
         """
@@ -385,14 +377,8 @@ class Mechanism:
         return InverseDynamicsResult(q, efforts, moved)
 
     def friction_load(self, state: MechanismState) -> Array:
-        """Return the loads of the drives' guides or gears [N m, N], (N, D)."""
-        if state.inverse_dynamics is not None or not self.has_guides:
-            return np.abs(state.transmitted) if state.inverse_dynamics is None else (
-                state.inverse_dynamics.efforts[LOAD])
-        across = np.cross(state.reactions.f[:, self._drive_rows],
-                          state.links.motion.z[:, self._drive_rows])
-        load: Array = np.linalg.norm(across, axis=2)
-        return load
+        """Return the loads of the drives' gears [N m, N], (N, D)."""
+        return np.abs(state.transmitted)
 
     def load_of_friction(self, state: MechanismState, joints: Any) -> StructureLoad | None:
         """Return None: what friction of passive joints adds to the loads is neglected."""
@@ -402,7 +388,7 @@ class Mechanism:
                   ) -> MechanismState:
         """Return the state at other positions and accelerations of the drives."""
         return replace(state, position=position, acceleration=acceleration, known=None,
-                       start=state.closed, nearby=None)
+                       motion=None)
 
     def singularity_margin(self, state: MechanismState) -> float | None:
         """Return 1 minus the condition number of the closures over its limit; None without any."""

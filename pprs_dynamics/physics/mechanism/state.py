@@ -145,12 +145,14 @@ class MechanismState(JointMotion):
     robot : Mechanism
     reversal : Reversal
     load : StructureLoad, optional
-    known : LinkMotion, optional
+    known : LinkMotion or ClosedForm, optional
         The kinematics, where they are known.
-    friction : JointFriction
+    friction : JointFriction or Joints
         The model's own, which is computed together with the efforts.
     start, nearby : (N, C) and (C,) arrays, optional
         See `Evaluation.forward_kinematics`.
+    motion : PlatformMotion, optional
+        The motion of the tool, where the state was made from it.
     """
 
     robot: Any = field(kw_only=True)
@@ -160,11 +162,12 @@ class MechanismState(JointMotion):
     friction: Any = field(default=NO_FRICTION, kw_only=True)
     start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
+    motion: Any = field(default=None, kw_only=True)
 
     def __getitem__(self, samples: Any) -> Self:
         """Return the samples that a slice, a mask or indices select, with their load."""
-        return replace(super().__getitem__(samples), known=None, nearby=None,
-                       start=None if self.start is None else self.start[samples],
+        return replace(super().__getitem__(samples), known=None, start=None, nearby=None,
+                       motion=None if self.motion is None else self.motion[samples],
                        load=None if self.load is None else self.load.at(samples))
 
     @property
@@ -183,19 +186,19 @@ class MechanismState(JointMotion):
 
     @cached_property
     def links(self) -> Any:
-        """The kinematics, a `LinkMotion`."""
+        """The kinematics: a `LinkMotion`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.kinematics(self) if self.known is None else self.known
 
     @property
     def closed(self) -> Array:
         """Closed coordinates, (N, C)."""
-        found = self.inverse_dynamics
-        closed: Array = self.links.motion.q if found is None else found.q
+        closed: Array = (self.links.motion.q if self.inverse_dynamics is None
+                         else self.inverse_dynamics.q)
         return closed
 
     @cached_property
     def reactions(self) -> Any:
-        """Frictionless efforts and reactions, `Loads`."""
+        """Frictionless efforts and reactions: `Loads`, or a `ClosedForm` of the 3-PPRS."""
         return self.robot.loads(self.links, self.load)
 
     @cached_property
@@ -234,8 +237,8 @@ class MechanismState(JointMotion):
 
     def joint_position(self, joint: str) -> Array:
         """Return the position of a passive joint [rad, m], (N,), or (N, 3) of three alike."""
-        position = [self.links.joint_position(name) for name in self.robot.joints_of(joint)]
-        return position[0] if len(position) == 1 else np.column_stack(position)
+        position: Array = self.links.joint_position(joint)
+        return position
 
     def perturbed(self, drive: int, step: float) -> MechanismState:
         """Return the state with a drive at other positions; all move as before."""

@@ -62,8 +62,8 @@ Q, V, A = 0, 1, 2  # rows of `Data.motion`
 # Of `Data.solution`.
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 # Rows of the parameters of drives, and of the efforts that follow from them.
-ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, GUIDE, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6, 7
-TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, LOAD, EFFORTS = 0, 1, 2, 3, 4, 5, 6
+ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
 # Names of the numbers of rows of the tables, and of the columns of some.
 SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'width')
 FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
@@ -78,9 +78,8 @@ WORST_CONDITION = 300.0
 # Of the size: by which rows may be open that others imply at home. Roundings of a file add up.
 OPEN_IN_MOTION = 1e-3
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
-# joints. Where rows are kept there is one for each sample, else one that all use in turn. Started,
-# each sample has coordinates of its own, near which its loops close.
-MOTION, FORCES, KEPT, STARTED = 1, 2, 4, 8
+# joints. Where rows are kept there is one for each sample, else one that all use in turn.
+MOTION, FORCES, KEPT = 1, 2, 4
 
 
 def _vector(k: int) -> Any:
@@ -839,16 +838,16 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     Parameters
     ----------
     drives : (OF_DRIVE, D) array
-        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, width of
-        the sign, and the joint across whose guide the load rubs, or 0: that of the gear.
+        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, and width
+        of the sign.
     v, a : (D,) arrays
         Velocities and accelerations of the drives.
     efforts : (EFFORTS, D) array
-        JOINT_EFFORT, TRANSMITTED and LOAD are given, the other rows are filled in.
+        JOINT_EFFORT and TRANSMITTED are given, the other rows are filled in.
     """
     for d in range(len(v)):
         efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
-        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * efforts[LOAD, d]
+        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * abs(efforts[TRANSMITTED, d])
         efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
                                       + dry * tanh(v[d] / drives[WIDTH, d]))
         efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
@@ -906,9 +905,6 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
         o = elements(read_loads(sizes, loads[at], reals))
         if stages & MOTION:
             q = given[0, s]
-            if stages & STARTED:
-                for c in range(len(home)):
-                    start[c] = closed[s, c]
             # First from coordinates of another motion, then from the last sample, then from home.
             is_closed = is_regular = False
             for trial in range(0 if nearby and s == 0 else 1, 3):
@@ -940,9 +936,7 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
             if not stages & KEPT:
                 own = efforts[:, s]
                 for d in range(given.shape[2]):
-                    own[TRANSMITTED, d], j = o.efforts[d], int(actuators[GUIDE, d])
-                    own[LOAD, d] = abs(o.efforts[d]) if j == 0 else length(product(
-                        vector(o.links, j, FORCE), vector(m.links, j, Z)))
+                    own[TRANSMITTED, d] = o.efforts[d]
                 joint_friction(t, m, o, rubbing)
                 for d in range(given.shape[2]):
                     own[JOINT_EFFORT, d] = o.efforts[d]
@@ -1009,7 +1003,7 @@ class InverseDynamicsResult(NamedTuple):
     q : (N, C) array or None
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
-        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED and LOAD [N m, N]; see
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
         `closed_form` for the other rows of a 3-PPRS.
     motion : three (N, D) arrays
         Position, velocity and acceleration of the drives.
@@ -1062,7 +1056,8 @@ class Evaluation:
         ----------
         q, v, a : (N, D) arrays
         start : (N, C) array, optional
-            Closed coordinates near those of each sample, which is walked to from there.
+            Closed coordinates of the samples; the first one is walked to from there, instead of
+            home.
         nearby : (C,) array, optional
             Closed coordinates of another motion: used where the first sample is within a stride
             of them and the loops stay assembled as at home, so that nothing depends on them.
@@ -1099,16 +1094,14 @@ class Evaluation:
             and what is filled in: closed coordinates (N, C) and efforts (EFFORTS, N, D).
         """
         warm = nearby is not None
+        first = (nearby if nearby is not None else
+                 self.home if start is None or not len(start) else start[0])
         rows = np.empty((1, self._lengths[0])) if rows is None else rows
-        results = results or (np.array(NO_FRICTION), self.no_actuators,
-                              np.empty((len(rows), len(self.home))), self._no_efforts)
-        if start is not None:
-            results[2][:], stages = start, stages | STARTED
         return int(run(
             evaluate, *self.packed, self.home,
-            self.at_home if warm or not stages & KEPT else NOWHERE,
-            np.array(self.home if nearby is None else nearby),
+            self.at_home if warm or not stages & KEPT else NOWHERE, np.array(first),
             self._no_motion if given is None else given, rows,
             *(bodies or (self._no_bodies, NO_GRAVITY)),
             np.empty((len(rows), self._lengths[1])) if loads is None else loads,
-            *results, stages, warm))
+            *(results or (np.array(NO_FRICTION), self.no_actuators,
+                          np.empty((len(rows), len(self.home))), self._no_efforts)), stages, warm))

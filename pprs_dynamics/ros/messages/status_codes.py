@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from pprs_dynamics.errors import (
+    ConvergenceError,
     EffectError,
     LimitError,
     MotionError,
@@ -39,7 +40,7 @@ CODES: tuple[str, ...] = (*REJECTIONS, *get_args(Condition))
 _KINDS: dict[str, RejectionCode] = {
     'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
 _CODES: dict[type[PprsError], RejectionCode] = {
-    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE',
+    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE', ConvergenceError: 'WORKSPACE',
     LimitError: 'LIMIT', EffectError: 'EFFECT'}
 
 

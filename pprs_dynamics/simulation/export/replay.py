@@ -10,6 +10,7 @@ engine's soft constraints.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import OPEN, EngineState, add_sites
@@ -86,7 +88,8 @@ class Replayed:
 
 def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Replayed:
     """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
-    motion = draw_motion(model, DURATION, 0)
+    motion: Any = (draw_motion(model, DURATION, 0) if model.moves_joints else Excitation(
+        duration=DURATION).motion(np.arange(0.0, DURATION, 1 / RATE)))
     state = model.initial_state()
     forces = model.measured(model.drive_forces(motion, state), state)
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))

@@ -11,6 +11,7 @@ from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class BaseTilt(BodyEffect):
@@ -43,6 +44,7 @@ class BaseTilt(BodyEffect):
     """
 
     name = 'base_tilt'
+    acts_in = frozenset({PLATFORM, MECHANISM})
     idealised = False
     nonlinear = True
     # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in

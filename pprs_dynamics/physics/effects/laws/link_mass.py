@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class LinkMass(AddedBody):
@@ -43,6 +44,7 @@ class LinkMass(AddedBody):
     """
 
     name = 'link_mass'
+    acts_in = frozenset({PLATFORM, MECHANISM})
     is_of_one_place = True
     linear = ()
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 
@@ -43,6 +44,7 @@ class PlatformInertia(BodyEffect):
     """
 
     name = 'platform_inertia'
+    acts_in = frozenset({PLATFORM, MECHANISM})
     is_in_payload = True
     idealised = False
     linear = (
