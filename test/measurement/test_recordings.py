@@ -25,7 +25,8 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.joint_states import JointStates
+from pprs_dynamics.measurement.files.joint_states import deserialized
+from pprs_dynamics.measurement.files.merged_states import States
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,
@@ -134,18 +135,17 @@ def test_collected_messages_agree_with_rosbags(
         state = made.message(shuffle.randrange(2**31 * 10**9), names, *arrays)
         little = not (big_endian and k % 3 == 0)
         data.append(bytes(made.STORE.serialize_cdr(state, made.STATE, little_endian=little)))
-    blocks = JointStates(DRIVES)
+    blocks = States(DRIVES)
     for k, raw in enumerate(data):
-        blocks.add(raw, k)
-    assert blocks.names == set(joints)
+        blocks.add('/a', made.STATE, deserialized(made.STORE, raw, made.STATE), k)
     states = [made.STORE.deserialize_cdr(raw, made.STATE) for raw in data]
     whole = [k for k, state in enumerate(states)
              if {*DRIVES} <= {*state.name} and len(state.position) == len(state.name)]
-    stamps, received, *arrays = blocks.arrays()
-    assert received.tolist() == whole
+    stamps, columns, _ = blocks.together(blocks.signals('/a', Path()))
     assert stamps.tolist() == [states[k].header.stamp.sec * 10**9 + states[k].header.stamp.nanosec
                                for k in whole]
-    for quantity, found in zip(made.QUANTITIES, arrays, strict=True):
+    for quantity in made.QUANTITIES:
+        found = np.stack([columns[drive, quantity] for drive in DRIVES], axis=1)
         values = [getattr(states[k], quantity) for k in whole]
         np.testing.assert_array_equal(found, np.array([
             [numbers[list(states[k].name).index(drive)] for drive in DRIVES] if len(numbers) else
@@ -160,21 +160,21 @@ def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str)
     state = JointState(name=['b', 'other', 'a'], **values)
     state.header.stamp.sec, state.header.stamp.nanosec = 12, 345
     state.header.frame_id = frame
-    blocks = JointStates(('a', 'b'))
-    blocks.add(serialize_message(state), 0)
-    stamps, _, *arrays = blocks.arrays()
+    blocks = States(('a', 'b'))
+    blocks.add('/a', made.STATE, deserialized(made.STORE, serialize_message(state), made.STATE), 0)
+    stamps, columns, _ = blocks.together(blocks.signals('/a', Path()))
     assert stamps.tolist() == [12 * 10**9 + 345]
-    for name, array in zip(made.QUANTITIES, arrays, strict=True):
-        expected = [np.nan, np.nan] if name in absent else [3.5, 1.5]
-        np.testing.assert_array_equal(array, [expected])
+    for name in made.QUANTITIES:
+        expected = [] if name in absent else [3.5, 1.5]
+        assert [columns[joint, name] for joint in 'ab' if (joint, name) in columns] == expected
 
 
 @settings(max_examples=200)
 @given(data=st.binary(max_size=200), start=st.booleans())
 def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None:
-    blocks = JointStates(DRIVES)
-    blocks.add(b'\x00\x01\x00\x00' + data if start else data, 0)
-    assert blocks.samples == 0
+    raw = b'\x00\x01\x00\x00' + data if start else data
+    state = deserialized(made.STORE, raw, made.STATE)
+    assert state is None or not (len(state.position) and {*DRIVES} <= {*state.name})
 
 
 def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> None:

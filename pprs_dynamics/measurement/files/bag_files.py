@@ -6,34 +6,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.drives import DriveColumns, RecordedDrives
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files import signals
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
-from pprs_dynamics.measurement.files.joint_states import JOINT_STATE, JointStates, message_types
-from pprs_dynamics.measurement.files.merged_states import (
+from pprs_dynamics.measurement.files.joint_states import (
     CONTROLLER,
     DYNAMIC,
+    JOINT_STATE,
     channel_of,
-    fields_of,
-    read_channels,
-    read_merged,
+    message_types,
     states_of,
 )
+from pprs_dynamics.measurement.files.merged_states import Key, Signal, States, fields_of
 from pprs_dynamics.measurement.files.name_hints import MOST, missing_names
 from pprs_dynamics.measurement.files.samples import (
+    CURRENT,
     Defect,
     Indices,
     Progress,
     Samples,
     whole_epoch,
 )
+from pprs_dynamics.measurement.files.signals import alternates
 from pprs_dynamics.system.files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
 
@@ -47,7 +47,6 @@ TOPIC_END = 'joint_states'
 COMMANDS = 'command', 'cmd', 'desired', 'reference', 'target', 'goal', 'setpoint'
 FIRST = 400  # messages of a topic of which one has an effort, if efforts were recorded
 STORAGE = {'.mcap': 'MCAP', '.db3': 'SQLITE3'}
-REPORTED = 8192  # messages between two reports of progress
 
 
 def read_bag(
@@ -63,79 +62,109 @@ def read_bag(
     MissingLibraryError
         Where rosbags is not installed.
     """
-    drives = recorded.joints or recorded.names
+    joints = recorded.joints or recorded.names
     with opened_bag(path) as (bag, findings):
-        samples = _by_columns(_read(bag, recorded, drives, topic, progress, findings), recorded)
-        return replace(samples, channels={**read_channels(bag, drives, _stamps(samples)),
-                                          **samples.channels})
+        fields = fields_of(bag, recorded)
+        of_fields = {field.topic for field in fields}
+        main = _chosen(bag, topic, joints) if {*joints} - {
+            field.joint for field in fields if field.quantity == 'position'} else []
+        states, first = States(joints, fields), main[0].topic if main else ''
+        states.collect(bag, [*main, *(c for c in bag.connections
+                                      if c.topic in of_fields and c not in main)], progress)
+        if main and not states.counts[first]:
+            raise UnreadableFileError(path, f'{first} contains no messages')
+        states.collect(bag, [c for c in bag.connections
+                             if c not in main and _has_channels(bag, c)], channels=True)
+        found = states.signals(first, path)
+        others = [c for c in bag.connections if c.msgtype == JOINT_STATE
+                  and c.topic != first and channel_of(c.topic, c.msgtype) is None]
+        if others and not (topic or fields or _have_efforts(found)):
+            states.collect(bag, others)
+            with_others = states.signals(first, path)
+            found = with_others if _have_efforts(with_others) else found
+    return _samples(path, recorded, states, found, first, findings)
 
 
-def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: str | None,
-          progress: Progress | None, findings: list[Defect]) -> Samples:
-    """Return motion and efforts."""
-    fields = fields_of(bag, recorded)
-    named = {(field.joint, field.quantity) for field in fields}
-    topics = {field.topic for field in fields}
-    connections = [] if fields and all((drive, 'position') in named for drive in drives) else (
-        _chosen(bag, topic, drives))
-    if fields:
-        return read_merged(bag, [*connections, *(
-            c for c in bag.connections if c.topic in topics and c not in connections)],
-            drives, findings, fields)
-    name = connections[0].topic
-    if connections[0].msgtype != JOINT_STATE:
-        return read_merged(bag, connections, drives, findings)
-    states = JointStates(drives)
-    total = sum(connection.msgcount for connection in connections)
-    done = 0
-    for done, (_, stamp, data) in enumerate(bag.messages(connections), 1):
-        states.add(data, stamp)
-        if progress is not None and (done % REPORTED == 0 or done == total):
-            progress(done, max(total, done))
-    if not done:
-        raise UnreadableFileError(bag.path, f'{name} contains no messages')
-    if not states.samples:
-        if states.twice:
-            raise UnreadableFileError(
-                bag.path, f'messages on {name} name {", ".join(sorted(states.twice))} twice: which '
-                'value is that of the drive is not known; record each joint once')
-        if set(drives) <= states.names:  # spread over several messages
-            return read_merged(bag, connections, drives, findings)
-        _tell_missing(bag.path, name, drives, states)
-    stamps, received, position, velocity, effort = states.arrays()
-    if mixed := [drive for drive, values in zip(drives, position.T, strict=True)
-                 if signals.alternates(values)]:
+def _have_efforts(signals: Mapping[Key, Signal]) -> bool:
+    return any(quantity == 'effort' for _, quantity in signals)
+
+
+def _has_channels(bag: Bag, connection: Connection) -> bool:
+    if connection.msgtype != DYNAMIC:
+        return channel_of(connection.topic, connection.msgtype) is not None
+    return any(quantity in CHANNELS for *_, message in bag.decoded([connection], 1)
+               for _, quantity, *_ in states_of(message, DYNAMIC))
+
+
+def _samples(path: Path, recorded: RecordedDrives, states: States,
+             signals: Mapping[Key, Signal], first: str, findings: list[Defect]) -> Samples:
+    """Return the samples that signals make, the first of them on a topic, '' for none."""
+    joints, together = states.joints, states.names
+    names = {name for message in together for name in message}
+    topics = states.topics_of(signals) or first
+    missing = [joint for joint in joints if (joint, 'position') not in signals]
+    if twice := [joint for joint in missing if any(
+            message.count(joint) > 1 for message in together)]:
         raise UnreadableFileError(
-            bag.path, f'the position of {", ".join(mixed)} on {name} jumps back and forth from '
+            path, f'messages on {topics} name {", ".join(twice)} twice: which value is that of '
+            'the drive is not known; record each joint once')
+    if unknown := [joint for joint in missing if joint not in names]:
+        raise UnreadableFileError(
+            path, f'{topics} lacks {", ".join(unknown[:MOST])}; it contains '
+            + (', '.join(sorted(names)[:MOST]) or 'no names')
+            + f'; {missing_names(joints, names, path.name[:40])}')
+    stamps, columns, are_whole = states.together(signals)
+    positions = [columns.get((joint, 'position'), np.full(len(stamps), np.nan))
+                 for joint in joints]
+    kept = np.full(len(stamps), are_whole) | np.isfinite(positions).all(axis=0)
+    if not np.any(kept):
+        raise UnreadableFileError(path, f'{topics} contains no positions of all of '
+                                  f'{", ".join(joints)} at the same times')
+    if not are_whole:
+        findings.append(Defect('merged', int(kept.sum()), f'merged by stamp from {topics}'))
+    elif mixed := [joint for joint, values in zip(joints, positions, strict=True)
+                   if alternates(values)]:
+        raise UnreadableFileError(
+            path, f'the position of {", ".join(mixed)} on {topics} jumps back and forth from '
             'message to message: two nodes publish there; record one of them')
-    others = [c for c in bag.connections if c.msgtype == JOINT_STATE
-              and c.topic != name and channel_of(c.topic, c.msgtype) is None]
-    if topic is None and others and np.all(np.isnan(effort)):
-        merged = read_merged(bag, [*connections, *others], drives, findings)
-        if np.any(np.isfinite(merged.effort)):
-            return merged
-    if not np.any(stamps):
+    elif others := sorted(names - {*joints}):
+        findings.append(Defect('ignored_joints', len(others),
+                               f'{topics} also contains {", ".join(others)}'))
+    if first and first not in states.stamped:
         findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
-        stamps = received
-    findings += _ignored(name, done, drives, states)
+    if are_whole and (skipped := states.counts[first] - len(stamps)):
+        findings.append(Defect(
+            'incomplete_messages', skipped,
+            f'{counted(skipped, "message")} of {states.counts[first]} on {topics} '
+            f'without one position each of {", ".join(joints)}'))
+    if any(signal.is_command for signal in signals.values()):
+        findings.append(Defect('commanded_efforts', int(kept.sum()), 'the efforts are what the '
+                               'controller commands: none were measured'))
     epoch = whole_epoch(stamps / 1e9)
-    return Samples(drives, (stamps - epoch * 10**9) / 1e9, position,
-                   None if np.all(np.isnan(velocity)) else velocity, effort, epoch, f'bag, {name}',
-                   tuple(findings))
+    return Samples.of_columns(
+        joints, (stamps[kept] - epoch * 10**9) / 1e9,
+        {key: values[kept] for key, values in _of_drives(columns, joints, recorded).items()},
+        f'bag, {topics}', tuple(findings), epoch)
 
 
-def _by_columns(samples: Samples, recorded: RecordedDrives) -> Samples:
-    """Return samples in which `columns` of the form <joint>/<quantity> name another joint's."""
-    columns = {} if recorded.columns is None else recorded.columns.drives
-    arrays = samples.measured
-    changed: Any = {name: values.copy() for name, values in arrays.items()}
-    for d, drive in enumerate(recorded.names):
-        for quantity, column in columns.get(drive, DriveColumns()).names.items():
-            joint, _, named = str(column).rpartition('/')
-            if joint in samples.drives and named == quantity and named in arrays:
-                changed[named][:, d] = arrays[named][:, samples.drives.index(joint)]
-    return replace(samples, **changed)
+def _of_drives(columns: Mapping[Key, Array], joints: tuple[str, ...], recorded: RecordedDrives,
+               ) -> dict[Key, Array]:
+    """Return the columns of drives: what is measured for all, and other joints' that are named.
+
+    `columns` of a model file name these as <joint>/<quantity>.
+    """
+    named = {} if recorded.columns is None else recorded.columns.drives
+    found = {**{(joint, quantity): values for (of, quantity), values in columns.items()
+                if not of for joint in joints}, **columns}
+    for joint, drive in zip(joints, recorded.names, strict=True):
+        for quantity, column in named.get(drive, DriveColumns()).names.items():
+            of, _, other = str(column).rpartition('/')
+            if other == quantity and (of, other) in columns:
+                found[joint, quantity] = columns[of, other]
+        if (joint, 'effort') in found:
+            found.pop((joint, CURRENT), None)
+    return found
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],
@@ -220,8 +249,9 @@ def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, sta
 def _has_efforts(bag: Bag, connections: list[Connection], drives: tuple[str, ...]) -> bool:
     """Return whether the first messages of a topic have positions of all drives, and efforts."""
     states = [(joint, quantity, value) for connection, _, message in bag.decoded(
-        connections, FIRST) for joint, quantity, value, _ in states_of(
-            message, connection.msgtype) if np.isfinite(value)]
+        connections, FIRST) for joints, quantity, values, _ in states_of(
+            message, connection.msgtype) for joint, value in zip(joints, values, strict=True)
+        if np.isfinite(value)]
     known = {(joint, quantity) for joint, quantity, _ in states}
     # Drivers fill what they do not measure with zeros.
     filled = {quantity for joint, quantity, value in states if joint in drives and value}
@@ -272,30 +302,3 @@ def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connec
         raise UnreadableFileError(
             path, f'there are joint states on {", ".join(matching)}: choose one with topic')
     return topics[matching[0]]
-
-
-def _tell_missing(
-    path: Path, topic: str, drives: tuple[str, ...], states: JointStates,
-) -> None:
-    missing = [drive for drive in drives if drive not in states.names]
-    raise UnreadableFileError(
-        path, f'{topic} lacks {", ".join(missing[:MOST])}; it contains '
-        + (', '.join(sorted(states.names)[:MOST]) or 'no names')
-        + f'; {missing_names(drives, states.names, path.name[:40])}')
-
-
-def _ignored(
-    topic: str, messages: int, drives: tuple[str, ...], states: JointStates,
-) -> list[Defect]:
-    findings = []
-    others = sorted(states.names - set(drives))
-    if others:
-        findings.append(Defect('ignored_joints', len(others),
-                               f'{topic} also contains {", ".join(others)}'))
-    skipped = messages - states.samples
-    if skipped:
-        findings.append(Defect(
-            'incomplete_messages', skipped,
-            f'{counted(skipped, "message")} of {messages} on {topic} '
-            f'without one position each of {", ".join(drives)}'))
-    return findings

@@ -16,8 +16,7 @@ from pprs_dynamics.measurement.files.array_files import WIDEST
 from pprs_dynamics.measurement.files.bag_files import CONTROLLER_TYPES
 from pprs_dynamics.measurement.files.bag_storage import Bag, is_bag, opened_bag
 from pprs_dynamics.measurement.files.csv_files import CsvTable
-from pprs_dynamics.measurement.files.joint_states import JOINT_STATE
-from pprs_dynamics.measurement.files.merged_states import states_of
+from pprs_dynamics.measurement.files.joint_states import JOINT_STATE, states_of
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import open_table
 from pprs_dynamics.system.files import readable
@@ -70,8 +69,8 @@ def _joints(bag: Bag) -> dict[str, dict[str, set[str]]]:
     for topic, kind, messages in _topics(bag, (JOINT_STATE, *CONTROLLER_TYPES)):
         of_topic = found.setdefault(topic, {})
         for message in messages:
-            for joint, quantity, value, _ in states_of(message, kind, topic):
-                if np.isfinite(value):
+            for names, quantity, values, _ in states_of(message, kind, topic):
+                for joint in np.array(names)[np.isfinite(values)].tolist():
                     of_topic.setdefault(joint, set()).add(quantity)
     return {topic: joints for topic, joints in found.items() if joints}
 
