@@ -123,9 +123,6 @@ class Sensitivities:
         Whether `HOMING` is needed.
     known : frozenset of str
         Names of columns that are not computed.
-    is_planned : bool
-        Whether the motion is only planned. Columns of added bodies are then those of rigid bodies:
-        all of them take one evaluation.
     """
 
     def __init__(self, model: DriveModel, given: DriveModel) -> None:
@@ -139,10 +136,7 @@ class Sensitivities:
         self.of_zeros = any(effect.shifts_positions() and given.offers(effect)
                             for effect in catalogue().values())
         self.known = frozenset[str]()
-        self.is_planned = False
         self._steps: dict[type[BodyEffect], list[BodyEffect]] = {}  # by coefficient
-        self._inertial: dict[type[AddedBody], Array] = {}
-        self._links: tuple[Any, Array] = None, np.empty(0)  # state, and its regressor
         self._own: tuple[Any, Array] = None, np.empty(0)  # state, and efforts of the model there
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
@@ -183,9 +177,27 @@ class Sensitivities:
         if is_closed_form:
             # Friction follows the loads of the closed form: splines would be 1 % off.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
+        there = {effect.name for effect in self.given.effects}
+        effects = {name: effect for name, effect in {
+            **{effect.name: effect for effect in self.searched},
+            **{PRESENT + effect.name: type(effect) for effect in self.model.effects
+               if isinstance(effect, StructureEffect) and effect.name in there}}.items()
+            if name not in self.known}
+        bodies = {name: effect for name, effect in effects.items()
+                  if issubclass(effect, BodyEffect)}
+        heavier = [] if NUMBERS in self.known else self._heavier
+        nodes, before = samples.nodes, self._own_efforts(samples.nodes)
+        changes = (self._efforts(self.model, loaded) - before for loaded in nodes.robot.under_loads(
+            nodes, [*(self._at(moved, nodes) for moved in heavier),
+                    *(loaded for body in bodies.values()
+                      for loaded in self._with_bodies(body, nodes))]))
         columns: dict[str, Array] = {}
         if NUMBERS not in self.known:
-            columns[NUMBERS] = self._of_numbers(forces, samples)
+            columns[NUMBERS] = self._of_numbers(forces, samples, {
+                id(moved): samples.interpolated([next(changes)])[:, 0] for moved in heavier})
+        for name, body in bodies.items():
+            columns[name] = samples.interpolated(
+                [next(changes) / c.scale for c in body.coefficients])
         if OF_DRIVES not in self.known:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
@@ -198,15 +210,8 @@ class Sensitivities:
         if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
                 replace(slow, sensors=[]).interpolated, self._of_shifted_positions(slow.nodes))
-        there = {effect.name for effect in self.given.effects}
-        present = {PRESENT + effect.name: type(effect) for effect in self.model.effects
-                   if isinstance(effect, StructureEffect) and effect.name in there}
-        for name, effect in {**{e.name: e for e in self.searched}, **present}.items():
-            if name in self.known:
-                continue
-            if issubclass(effect, BodyEffect):
-                columns[name] = samples.interpolated(self._of_bodies(effect, samples.nodes))
-            else:
+        for name, effect in effects.items():
+            if name not in bodies:
                 columns[name] = samples.treated(self._of_forces(effect, state))
         return columns
 
@@ -289,10 +294,15 @@ class Sensitivities:
             found[number] = models[place]
         return found
 
-    def _of_numbers(self, forces: Any, samples: Samples) -> Array:
-        """Return the columns of all numbers, (M, K, D)."""
+    @cached_property
+    def _heavier(self) -> list[DriveModel]:
+        """The models with moved numbers of bodies."""
+        return [*{id(moved): moved for number, moved in self._moved.items() if number.key != GAIN
+                  and not number.key.startswith(('friction.', 'geometry.'))}.values()]
+
+    def _of_numbers(self, forces: Any, samples: Samples, changes: dict[int, Array]) -> Array:
+        """Return the columns of all numbers, (M, K, D); `changes` by moved model, of bodies."""
         columns = np.zeros((len(samples.treat), len(self.numbers), len(self.model.drives)))
-        changes: dict[int, Array] = {}
         for row, number in enumerate(self.numbers):
             moved = self._moved[number]
             if id(moved) not in changes:
@@ -311,12 +321,8 @@ class Sensitivities:
             return samples.treated([-forces.total * RELATIVE_STEP * given / self.model.gain])
         if number.key.startswith('friction.'):
             found = state.with_smoothing(moved.reversal)
-        elif number.key.startswith('geometry.'):  # with it friction turns over at other times
+        else:  # of the geometry: with it friction turns over at other times
             found = self._at(moved, moved.at_drives(state))
-        else:
-            state = samples.nodes
-            return samples.interpolated([self._efforts(moved, self._at(moved, state))
-                                         - self._own_efforts(state)])
         return samples.treated([self._efforts(moved, found) - self._own_efforts(state)])
 
     def _present(self, effect: type[StructureEffect]) -> StructureEffect | None:
@@ -335,41 +341,23 @@ class Sensitivities:
         return [(effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale}).force(state)
                  - before) / c.scale for c in effect.coefficients]
 
-    def _of_bodies(self, effect: type[BodyEffect], state: Any) -> list[Array]:
-        """Return columns of an effect on bodies, per unit of each coefficient.
+    def _with_bodies(self, effect: type[BodyEffect], state: Any) -> list[Any]:
+        """Return the state with an effect on bodies, one for the scale of each coefficient.
 
-        With the friction that its loads cause. Around the values that the model has, but those of
-        added bodies are around none: `AddedBody.around` makes them exact for where one is.
+        Around the values that the model has, but those of added bodies are around none:
+        `AddedBody.around` makes them exact for where one is.
         """
         present = self._present(effect)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None
-            if self.is_planned and self.model.moves_joints:
-                return self._of_rigid_bodies(effect, state)
         if effect not in self._steps:
             values = {} if present is None else effect.to_coefficients(present.values)
             self._steps[effect] = [effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
                                    for c in effect.coefficients]
-        before = self._own_efforts(state)
-        found = []
-        for c, moved in zip(effect.coefficients, self._steps[effect], strict=True):
-            loaded = moved.apply(state) if present is None else self._at(replace(
-                self.model, effects=tuple(moved if other is present else other
-                                          for other in self.model.effects)), state)
-            found.append((self._efforts(self.model, loaded) - before) / c.scale)
-        return found
-
-    def _of_rigid_bodies(self, effect: type[AddedBody], state: Any) -> list[Array]:
-        """Return columns of added bodies without the friction that they cause."""
-        robot = self.model.robot
-        if effect not in self._inertial:
-            self._inertial[effect] = np.stack([
-                (effect.at({c.name: c.scale}).changed(robot).inertial - robot.inertial).ravel()
-                / c.scale for c in effect.coefficients])
-        if self._links[0] is not state:
-            self._links = state, robot.regressor(state.position, state.velocity,
-                                                 state.acceleration)
-        return [*np.tensordot(self._inertial[effect], self._links[1], (1, 2))]
+        return [moved.apply(state) if present is None else self._at(replace(
+            self.model, effects=tuple(moved if other is present else other
+                                      for other in self.model.effects)), state)
+                for moved in self._steps[effect]]
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ are closed for them as they are for the drives.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -154,8 +155,9 @@ class LinkMotion:
         evaluation = self.structure.evaluation
         table = np.zeros((len(self.rows), tree.length_of(Loads, evaluation.sizes)))
         found = tree.views(Loads, evaluation.sizes, table)
-        if load is not None:
-            self._apply(load, found)
+        for row, wrench in self.wrenches(load):
+            found.f[:, row] += wrench[:, :3]
+            found.n[:, row] += wrench[:, 3:]
         evaluation.run(tree.FORCES | tree.KEPT, self.rows, bodies=(inertial, gravity), loads=table)
         return found
 
@@ -181,24 +183,48 @@ class LinkMotion:
         position: Array = t.ratio[row] * self.motion.q[:, t.coordinate[row]] + t.offset[row]
         return position
 
-    def _apply(self, load: StructureLoad, found: Loads) -> None:
-        """Add a load, as wrenches that links apply, to loads by the joints that move them."""
+    def wrenches(self, load: StructureLoad | None) -> list[tuple[int, Array]]:
+        """Return joints to whose links a load is applied, and wrenches about their origins, (N, 6).
+        """
         t, m = self.structure.tables, self.motion
-        row, _ = self.structure.links[self.structure.tool]
-        arm = self.frame_of(self.structure.tool).p - m.p[:, row]
-        force, moment = load.wrench[:, :3], load.wrench[:, 3:]
-        found.f[:, row] += force
-        found.n[:, row] += moment + np.cross(arm, force)
+        found: list[tuple[int, Array]] = []
+        if load is None:
+            return found
+        if np.any(load.wrench):
+            row, _ = self.structure.links[self.structure.tool]
+            arm = self.frame_of(self.structure.tool).p - m.p[:, row]
+            force, moment = load.wrench[:, :3], load.wrench[:, 3:]
+            found.append((row, np.hstack((force, moment + np.cross(arm, force)))))
         for name, torque in load.torques.items():
             row = self.structure.rows[name]
             along = torque[:, None] * m.z[:, row]
             # What the link of a joint applies, the one that it hangs on takes back.
-            for joint, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
-                if t.turns[row]:
-                    found.n[:, joint] += sign * along
-                else:
-                    found.f[:, joint] += sign * along
-                    found.n[:, joint] += sign * np.cross(m.p[:, row] - m.p[:, joint], along)
+            for joint, force in ((row, along), (int(t.parent[row]), -along)):
+                found.append((joint, np.hstack(
+                    (0.0 * force, force) if t.turns[row] else
+                    (force, np.cross(m.p[:, row] - m.p[:, joint], force)))))
+        return found
+
+    def changes_by_loads(
+        self, loads: Loads, friction: JointFriction, guides: Integers, quantities: int, count: int,
+        added: Sequence[tuple[int, int, bool]], bodies: Sequence[Array],
+        applied: Sequence[tuple[int, int]], wrenches: Sequence[Array],
+    ) -> Array:
+        """Return changes by columns of bodies and wrenches, (count, quantities, N, D).
+
+        To first order in them; see `tree_equations.changes_by_loads`.
+        """
+        t, samples = self.structure.tables, len(self.rows)
+        columns = quantities * len(t.drives)
+        changes: Array = np.zeros((count, quantities, samples, len(t.drives)))
+        run(tree.changes_by_loads, *self.structure.evaluation.packed, self.rows, loads.links,
+            loads.loops, np.array(friction), guides,
+            np.array(added, dtype=np.int64).reshape(-1, 3),
+            np.reshape(bodies, (-1, PARAMETERS + 3)),
+            np.array(applied, dtype=np.int64).reshape(-1, 2),
+            np.reshape(wrenches, (-1, samples, 6)), np.empty((len(self.structure.home), columns)),
+            np.empty((len(t.closures), 3, columns)), np.empty((len(t.joints), 6, columns)), changes)
+        return changes
 
     def regressor(self, rows: Integers, gravity: Array) -> Array:
         """Return the derivatives of the efforts by the parameters of bodies, (N, D, 10 B)."""

@@ -10,7 +10,7 @@ R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 8.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -42,14 +42,17 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
     EFFORTS,
     FORCES,
+    JOINT_EFFORT,
     MOTION,
     NO_FRICTION,
     RIGID,
+    TRANSMITTED,
     WORST_CONDITION,
     InverseDynamicsResult,
     JointFriction,
 )
 
+NO_GUIDES = np.zeros(0, dtype=np.int64)
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 
 
@@ -330,6 +333,39 @@ class Mechanism:
     def loads(self, links: Any, load: StructureLoad | None) -> Any:
         """Return the frictionless loads of joints and closures."""
         return links.loads(self.by_joint, self.gravity_row, load)
+
+    def under_loads(self, state: MechanismState, others: Sequence[MechanismState],
+                    ) -> Iterator[MechanismState]:
+        """Yield states of the same motion with other bodies and loads, evaluated together.
+
+        Efforts and the robot's own friction of joints are to first order in what differs.
+        """
+        links, added, bodies, applied, wrenches = state.links, [], [], [], []
+        for k, other in enumerate(others):
+            gravity = other.robot.gravity_row
+            for table, moves, pull in (
+                    (other.robot.by_joint - self.by_joint, True, -gravity),
+                    (self.by_joint, False, self.gravity_row - gravity)):
+                for row in np.flatnonzero(table.any(axis=1)) if moves or pull.any() else ():
+                    added.append((k, row, moves))
+                    bodies.append(np.append(table[row], pull))
+            for sign, load in ((1, other.load), (-1, state.load)):
+                if other.load is not state.load:
+                    for row, wrench in links.wrenches(load):
+                        applied.append((k, row))
+                        wrenches.append(sign * wrench)
+        efforts = np.empty((EFFORTS, *state.position.shape))
+        efforts[TRANSMITTED], efforts[JOINT_EFFORT] = (
+            state.transmitted, state.friction_efforts(state.friction))
+        for other, change in zip(others, links.changes_by_loads(
+                state.reactions, state.friction, NO_GUIDES, 2, len(others), added, bodies, applied,
+                wrenches), strict=True):
+            found = replace(other, friction=state.friction)
+            changed = efforts.copy()
+            changed[[TRANSMITTED, JOINT_EFFORT]] += change
+            vars(found)['inverse_dynamics'] = InverseDynamicsResult(
+                links.motion.q, changed, (state.position, state.velocity, state.acceleration))
+            yield found
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
         """Return closed coordinates, efforts and own friction in one pass."""

@@ -56,6 +56,7 @@ PARENT, TURNS, COORDINATE = 0, 1, 2
 LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
+COLUMN, LINK, MOVES = 0, 1, 2
 UNIT = 2  # column of `row_reals`
 STRIDE, MEASURE = 0, 1  # columns of `units`
 Q, V, A = 0, 1, 2  # rows of `Data.motion`
@@ -77,6 +78,7 @@ WARM_STEPS = 6  # of Newton, in which loops close that were closed within a stri
 WORST_CONDITION = 300.0
 # Of the size: by which rows may be open that others imply at home. Roundings of a file add up.
 OPEN_IN_MOTION = 1e-3
+TINY = 1e-300
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
 # joints. Where rows are kept there is one for each sample, else one that all use in turn.
 MOTION, FORCES, KEPT = 1, 2, 4
@@ -770,14 +772,10 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):
-        mass = inertial[j, 0]
-        h = turned(links, j, R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
-        a, w, wd = minus(vector(links, j, UD), g), vector(links, j, W), vector(links, j, WD)
-        increase(o.links, j, FORCE, plus(
-            plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
-        spin = plus(_inertia_times(links, j, inertial, wd),
-                    product(w, _inertia_times(links, j, inertial, w)))
-        increase(o.links, j, MOMENT, plus(spin, product(h, a)))
+        force, moment = body_wrench(links, j, inertial, j, minus(vector(links, j, UD), g),
+                                    vector(links, j, W), vector(links, j, WD))
+        increase(o.links, j, FORCE, force)
+        increase(o.links, j, MOMENT, moment)
     for c in range(len(o.tau)):
         o.tau[c] = 0.0
     for j in range(len(t.joints) - 1, 0, -1):
@@ -791,10 +789,29 @@ def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -
     project_to_actuators(t.passive, t.drives, m.drive_to_joint, o)
 
 
-def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
+def body_wrench(links: Any, j: int, inertial: Any, k: int, a: Vector, w: Vector, wd: Vector) -> Any:
+    """Return force, and moment about the origin of link j, that move the body in row k.
+
+    Parameters
+    ----------
+    links : (J + 1, OF_LINK, 3) array
+    j : int
+    inertial : (n, 10) array
+    k : int
+    a, w, wd : Vector
+        Acceleration of the link's origin less gravity, angular velocity and acceleration.
+    """
+    h = turned(links, j, R, Vector(inertial[k, 1], inertial[k, 2], inertial[k, 3]))
+    force = plus(plus(times(inertial[k, 0], a), product(wd, h)), product(w, product(w, h)))
+    spin = plus(_inertia_times(links, j, inertial, k, wd),
+                product(w, _inertia_times(links, j, inertial, k, w)))
+    return force, plus(spin, product(h, a))
+
+
+def _inertia_times(links: Any, j: int, inertial: Any, k: int, v: Vector) -> Vector:
     x, y, z = turned_back(links, j, R, v)
-    xx, xy, yy = inertial[j, 4], inertial[j, 5], inertial[j, 6]
-    xz, yz, zz = inertial[j, 7], inertial[j, 8], inertial[j, 9]
+    xx, xy, yy = inertial[k, 4], inertial[k, 5], inertial[k, 6]
+    xz, yz, zz = inertial[k, 7], inertial[k, 8], inertial[k, 9]
     return turned(links, j, R, Vector(
         xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
 
@@ -952,6 +969,163 @@ def oppose_friction(sizes: Any, integers: Any, reals: Any, motions: Any, links: 
         m = elements(read_motion(sizes, motions[s], reals))
         o = Loads(links[s], loops[s], of_tree, efforts[s])
         joint_friction(t, m, o, rubbing)
+
+
+# --- changes of efforts by changes of loads ---------------------------------------------------
+
+
+def virtual_motions(t: Model, m: Data, f: Any, F: Any, rubbing: Any, guides: Any, rates: Any,
+                    held: Any, moved: Any) -> None:
+    """Fill in the motions of links by which wrenches on them change what the drives feel.
+
+    By virtual work: the power of a wrench on column r of its link's motion is the change of
+    quantity r. Quantities are, of D drives each, the transmitted efforts; the efforts against
+    friction of joints; and the loads of guides. The latter two follow the size of the force
+    across a joint, whose derivative is a slide along that force; slides move closures, and those
+    the passive coordinates.
+
+    Parameters
+    ----------
+    t, m : Model, Data
+    f, F : arrays
+        `Loads.links` and `Loads.loops`.
+    rubbing : (6, F) array
+        A `JointFriction`.
+    guides : (D,) or (0,) int array
+        Joints whose loads are wanted.
+    rates : (C, R) array
+        Of the coordinates; with R = D, 2 D or 3 D the first quantities are found.
+    held : (L, 3, R) array
+        Slides of closures.
+    moved : (J + 1, 6, R) array
+        Linear velocity of each link's origin, and angular velocity.
+    """
+    T, links, drives, columns = m.drive_to_joint, m.links, len(t.drives), rates.shape[1]
+    for r in range(columns):
+        for c in range(len(rates)):
+            rates[c, r] = T[c, r] if r < drives else 0.0
+        for j in range(len(moved)):
+            for x in range(6):
+                moved[j, x, r] = 0.0
+        for g in range(len(held)):
+            for x in range(3):
+                held[g, x, r] = 0.0
+    if columns > drives:
+        for k in range(rubbing.shape[1]):
+            j, g = int(rubbing[0, k]), int(rubbing[1, k])
+            lever, width = rubbing[4, k], rubbing[5, k]
+            if j >= 0:
+                c, ratio = t.joints[j, COORDINATE], t.frames[j, GAIN, 0]
+                share = lever * ratio * tanh(ratio * m.motion[V, c] / width)
+                along = times(share, direction_across(f, links, j))
+                for d in range(drives):
+                    _slide(moved, j, drives + d, times(T[c, d], along))
+            else:
+                force = vector(F, g, FORCE)
+                relative = minus(vector(links, t.closures[g, LOOP_B], W),
+                                 vector(links, t.closures[g, LOOP_A], W))
+                share = lever * sign_over_speed(length(relative), width) / larger(
+                    length(force), TINY)
+                for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
+                    i = t.path[n, JOINT]
+                    if t.joints[i, TURNS]:
+                        along = times(share * t.path[n, SIGN] * t.frames[i, GAIN, 0] * dot(
+                            vector(links, i, Z), relative), force)
+                        for d in range(drives):
+                            _slide(held, g, drives + d,
+                                   times(T[t.joints[i, COORDINATE], d], along))
+    for d in range(len(guides)):
+        _slide(moved, guides[d], 2 * drives + d, direction_across(f, links, guides[d]))
+    for g in range(len(held)):
+        for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
+            j, sign = t.path[n, JOINT], 1.0 * t.path[n, SIGN]
+            for x in range(3):
+                for r in range(drives, columns):
+                    held[g, x, r] -= sign * moved[j, x, r]
+    for row in range(len(t.passive)):
+        if t.rows[row, KIND] == TRANSLATION and columns > drives:
+            g, e = t.rows[row, LOOP], row_axis(t, m, row)
+            for r in range(drives, columns):
+                slide = e.x * held[g, 0, r] + e.y * held[g, 1, r] + e.z * held[g, 2, r]
+                for c in range(len(t.passive)):
+                    rates[t.passive[c], r] += m.system[c, len(t.passive) + row] * slide
+    for j in range(1, len(t.joints)):
+        i, c, ratio = t.joints[j, PARENT], t.joints[j, COORDINATE], t.frames[j, GAIN, 0]
+        z, arm = vector(links, j, Z), minus(vector(links, j, P), vector(links, i, P))
+        first = 3 if t.joints[j, TURNS] else 0
+        for r in range(columns):
+            x, y, w = moved[i, 3, r], moved[i, 4, r], moved[i, 5, r]
+            moved[j, 0, r] += moved[i, 0, r] + y * arm.z - w * arm.y
+            moved[j, 1, r] += moved[i, 1, r] + w * arm.x - x * arm.z
+            moved[j, 2, r] += moved[i, 2, r] + x * arm.y - y * arm.x
+            moved[j, 3, r], moved[j, 4, r], moved[j, 5, r] = x, y, w
+            own = ratio * rates[c, r]
+            moved[j, first, r] += own * z.x
+            moved[j, first + 1, r] += own * z.y
+            moved[j, first + 2, r] += own * z.z
+
+
+def direction_across(f: Any, links: Any, j: int) -> Vector:
+    """Return the unit vector of a joint's force across its axis; 0 without any."""
+    z = vector(links, j, Z)
+    across = product(vector(f, j, FORCE), z)
+    return times(1.0 / larger(length(across), TINY), product(z, across))
+
+
+def _slide(table: Any, j: int, r: int, v: Vector) -> None:
+    table[j, 0, r] += v.x
+    table[j, 1, r] += v.y
+    table[j, 2, r] += v.z
+
+
+def changes_by_loads(sizes: Any, integers: Any, reals: Any, motions: Any, links: Any, loops: Any,
+                     rubbing: Any, guides: Any, added: Any, bodies: Any, applied: Any,
+                     wrenches: Any, rates: Any, held: Any, moved: Any, changes: Any) -> None:
+    """Add up changes of what the drives feel by columns of bodies and wrenches on links.
+
+    Parameters
+    ----------
+    motions, links, loops : arrays
+        Rows of `forward_kinematics`, and the loads, of N samples.
+    rubbing, guides : arrays
+        See `virtual_motions`, as `rates`, `held` and `moved`, of which there is one for all.
+    added : (n, 3) int array
+        Column, link, and whether the body moves as the link does or stands.
+    bodies : (n, 13) array
+        Inertial parameters, and the acceleration of the body in addition.
+    applied : (w, 2) int array
+        Column and link of each wrench.
+    wrenches : (w, N, 6) array
+        That links apply: force, and moment about their origin.
+    changes : (K, Q, N, D) array
+        The first Q quantities of `virtual_motions`.
+    """
+    t = elements(read_tables(sizes, integers, reals))
+    for s in range(len(motions)):
+        m = elements(read_motion(sizes, motions[s], reals))
+        virtual_motions(t, m, links[s], loops[s], rubbing, guides, rates, held, moved)
+        for n in range(len(added)):
+            j, moves = added[n, LINK], 1.0 * added[n, MOVES]
+            a = Vector(bodies[n, 10], bodies[n, 11], bodies[n, 12])
+            force, moment = body_wrench(
+                m.links, j, bodies, n, plus(a, times(moves, vector(m.links, j, UD))),
+                times(moves, vector(m.links, j, W)), times(moves, vector(m.links, j, WD)))
+            _add_power(moved, j, force, moment, changes, added[n, COLUMN], s)
+        for n in range(len(applied)):
+            w = wrenches[n]
+            _add_power(moved, applied[n, LINK], Vector(w[s, 0], w[s, 1], w[s, 2]),
+                       Vector(w[s, 3], w[s, 4], w[s, 5]), changes, applied[n, COLUMN], s)
+
+
+def _add_power(moved: Any, j: int, force: Vector, moment: Vector, changes: Any, k: int, s: int,
+               ) -> None:
+    drives = changes.shape[3]
+    for quantity in range(changes.shape[1]):
+        for d in range(drives):
+            r = quantity * drives + d
+            changes[k, quantity, s, d] += (
+                force.x * moved[j, 0, r] + force.y * moved[j, 1, r] + force.z * moved[j, 2, r]
+                + moment.x * moved[j, 3, r] + moment.y * moved[j, 4, r] + moment.z * moved[j, 5, r])
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
@@ -567,6 +567,11 @@ class ThreePprs(Mechanism):
         if load is found.load and self is found.robot:
             return found
         return ClosedForm(self, found.motion, load, found.joints)
+
+    def under_loads(self, state: MechanismState, others: Sequence[MechanismState],
+                    ) -> Iterator[MechanismState]:
+        """Yield states, which have a closed form."""
+        yield from others
 
     def inverse_dynamics(self, state: MechanismState) -> None:
         """Return None: the model evaluates its one pass itself."""
