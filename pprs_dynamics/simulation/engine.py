@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MissingLibraryError, ModelError
+from pprs_dynamics.errors import ModelError, optional_library
 from pprs_dynamics.physics.mechanism.description import inertial_in, principal_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
@@ -281,7 +281,7 @@ class MechanismEngine:
         """Return the forces across the axes of joints, (N, K, 3)."""
         bodies = [self.links[self.structure.rows[name]] for name in names]
         return np.cross(carried.forces[:, bodies],
-                        carried.axes[:, [self.state.number(name) for name in names]])
+                        carried.axes[:, [self.state.numbers[name] for name in names]])
 
     def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
         """Return efforts against friction of joints along a motion, (N, D); see `friction`.
@@ -377,10 +377,7 @@ def load_engine(purpose: str = 'the simulated robot') -> Any:
     MissingLibraryError
         If it is not installed.
     """
-    try:
-        import mujoco
-    except ImportError:
-        raise MissingLibraryError('mujoco', purpose, 'sim') from None
+    mujoco = optional_library('mujoco', 'mujoco', purpose, 'sim')
     if mujoco.get_mju_user_warning() is None:
         # By default it writes MUJOCO_LOG.TXT into the user's folder; warnings are counted anyway.
         mujoco.set_mju_user_warning(lambda message: None)

@@ -84,7 +84,7 @@ class EngineState:
         self.sites = {model.site(k).name.removeprefix(SITE): k for k in range(model.nsite)
                       if model.site(k).name.startswith(SITE)}
         self.joints = {int(k): name for k in range(model.njnt) if (name := model.joint(k).name)}
-        self._numbers = {name: k for k, name in self.joints.items()}
+        self.numbers = {name: k for k, name in self.joints.items()}
 
     @cached_property
     def drives(self) -> list[int]:
@@ -93,15 +93,11 @@ class EngineState:
 
     def dof(self, joint: str) -> int:
         """Return the degree of freedom of a joint of one coordinate."""
-        return int(self.model.jnt_dofadr[self.number(joint)])
+        return int(self.model.jnt_dofadr[self.numbers[joint]])
 
     def place(self, joint: str) -> int:
         """Return where the position of a joint of one coordinate is among the engine's."""
-        return int(self.model.jnt_qposadr[self.number(joint)])
-
-    def number(self, joint: str) -> int:
-        """Return the number of a joint in the engine."""
-        return self._numbers[joint]
+        return int(self.model.jnt_qposadr[self.numbers[joint]])
 
     @cached_property
     def standing(self) -> Array:
@@ -131,8 +127,8 @@ class EngineState:
     def rest(self) -> Array:
         """Positions of all joints where the drives are at 0, (nq,): locked ones within limits."""
         model, rest = self.model, self.model.qpos0.copy()
-        for name in self.structure.locked.keys() & self._numbers.keys():  # none is in an export
-            k, at, position = self.number(name), self.place(name), self.structure.locked[name]
+        for name in self.structure.locked.keys() & self.numbers.keys():  # none is in an export
+            k, at, position = self.numbers[name], self.place(name), self.structure.locked[name]
             rest[at] = np.clip(position, *model.jnt_range[k]) if model.jnt_limited[k] else position
         for _ in self.couplings:  # chains of them
             for a, b, ratio, offset in self.couplings:

@@ -572,19 +572,22 @@ def _joint_friction(run: Injection) -> Injected:
 def _joint_spring(run: Injection) -> Injected:
     """Inject k x (1 + (x / x_h)^2), x = u - u_0, in a passive joint, or in all that are alike."""
     groups = _passive_joints(run, 'joint_spring', balls=False)
-    closed = run.engine.closed(run.motion)
+    closed, state = run.engine.closed(run.motion), run.engine.state
+
+    def angles_of(name: str) -> Array:
+        return closed.position[:, [state.place(joint) for joint in groups[name]]]
 
     def draw() -> dict[str, Any]:
         name = str(run.random.choice(list(groups)))
-        angle = closed.position[:, [run.engine.state.place(joint) for joint in groups[name]]]
-        felt = np.abs(closed.rates[:, [run.engine.state.dof(joint) for joint in groups[name]]])
+        angle = angles_of(name)
+        felt = np.abs(closed.rates[:, [state.dof(joint) for joint in groups[name]]])
         way = float(np.ptp(angle))
         return {'name': name, 'stiffness': 2 * run.share_of_largest(felt.max(axis=1)) / way,
                 'rest': float(angle.mean()), 'way': way}
 
     name, stiffness, rest, way = run.sizes(draw).values()
-    off = closed.position[:, [run.engine.state.place(joint) for joint in groups[name]]] - rest
-    run.passive[:, [run.engine.state.dof(joint) for joint in groups[name]]] += (
+    off = angles_of(name) - rest
+    run.passive[:, [state.dof(joint) for joint in groups[name]]] += (
         stiffness * off * (1 + (off / way) ** 2))
     return None, {f'{name}.stiffness': stiffness, f'{name}.position': rest}
 

@@ -52,7 +52,7 @@ from pprs_dynamics.physics.model.recorded_names import (
     MEASURED,
 )
 from pprs_dynamics.physics.model.robot_block import coupled
-from pprs_dynamics.system.plain_yaml import scalar
+from pprs_dynamics.system.plain_yaml import as_yaml
 
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
@@ -150,8 +150,8 @@ class FirstModel:
         lines = TEXT.format(
             name=self.robot.name, read_with=f', read with {", ".join(names)}' if names else '',
             format='mjcf' if self.is_mjcf else 'urdf', unit='N' if slides else 'N m',
-            place=scalar(os.path.relpath(self.robot.resolve(), self.path.resolve().parent)),
-            base=scalar(self.base), tool=scalar(self.branch.tool), drives=_yaml([*self.drives]),
+            place=as_yaml(os.path.relpath(self.robot.resolve(), self.path.resolve().parent)),
+            base=as_yaml(self.base), tool=as_yaml(self.branch.tool), drives=as_yaml([*self.drives]),
             mark='' if is_current else '# ', ones=', '.join(['1.0'] * len(self.drives)),
             loops=''.join(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
                           'description\n' for loop in self.description.loops),
@@ -160,11 +160,11 @@ class FirstModel:
         renamed = {drive: name for drive in self.drives
                    if (name := self.names.get(drive, drive)) != drive}
         if renamed:
-            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
+            lines.append(f'    joint_map: {as_yaml(renamed)}  # what recordings call them')
         if self.columns:
             lines += ['    columns:  # of tables: names, or numbers from 1',
                       *(f'      # guessed: {note}' for note in self.guessed),
-                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
+                      *(f'      {as_yaml(key)}: {as_yaml(value)}{_comment(key, value)}'
                         for key, value in self.columns.items())]
         lines += [f'    # not sure: {question}' for question in self.questions]
         return '\n'.join(lines) + '\n'
@@ -244,7 +244,7 @@ def first_model(
     if by_numbers:
         draft.questions.append(
             f'the joints of {given[0].name} are matched by their numbers alone: if it is a '
-            f'recording of this robot, keep joint_map: {_yaml(names)}')
+            f'recording of this robot, keep joint_map: {as_yaml(names)}')
     if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
                      f'{draft.path.name}')
@@ -554,12 +554,3 @@ def _comment(key: str, value: Any) -> str:
     if key == 'files' and '*' in value[POSITION]:
         return '  # * is what recordings in one folder differ in'
     return f'  # {comments[key]}' if key in comments else ''
-
-
-def _yaml(value: Any) -> str:
-    """Return a value in one line of YAML."""
-    if isinstance(value, Mapping):
-        return '{' + ', '.join(f'{scalar(key)}: {_yaml(item)}' for key, item in value.items()) + '}'
-    if isinstance(value, list):
-        return '[' + ', '.join(map(_yaml, value)) + ']'
-    return f'{value:.12g}' if isinstance(value, float) else scalar(value)

@@ -28,7 +28,7 @@ from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model import recorded_names
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
-from pprs_dynamics.system.plain_yaml import scalar
+from pprs_dynamics.system.plain_yaml import as_yaml
 
 KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
          recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
@@ -97,8 +97,8 @@ def columns_line(scales: Iterable[Scale], has_columns: bool = False) -> str:
     blocks: dict[str, dict[str, None]] = {}
     for drive, key, value in scales:
         blocks.setdefault(drive, {})[
-            f'{key}: {scalar(value) if isinstance(value, str | int) else f"{value:.7g}"}'] = None
-    entries = [entry if not drive else f'{scalar(drive)}: {{{entry}}}' for drive, entry in (
+            f'{key}: {as_yaml(value) if isinstance(value, str | int) else f"{value:.7g}"}'] = None
+    entries = [entry if not drive else f'{as_yaml(drive)}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
     if has_columns and entries:
         return f'under columns, in addition to its content: {", ".join(entries)}'
@@ -249,7 +249,7 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
     if not any(names.values()):
         if len(moved) > 1:
             return (), 'joint_map: {' + ', '.join(
-                f'{scalar(drives[k])}: {scalar(joints[moved[0][1][k]])}'
+                f'{as_yaml(drives[k])}: {as_yaml(joints[moved[0][1][k]])}'
                 for k in reading.drives) + '}'
         known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
         names = {drive: {key: f'{joint}/{key}' for key in known}
@@ -319,7 +319,7 @@ def find_shares(model: DriveModel) -> Iterator[OtherReading]:
             'effort_share', model.drives, group,
             f'{named_so}: a share of a torque or force that the file does not name',
             f'effort_scale: 0.01 times that (of per mille 0.001 times), as in columns: '
-            f'{{{scalar(model.drives[group[0]])}: {{effort_scale: 0.3}}}}')
+            f'{{{as_yaml(model.drives[group[0]])}: {{effort_scale: 0.3}}}}')
 
 
 def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares], has_gain: bool,

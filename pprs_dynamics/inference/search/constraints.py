@@ -143,7 +143,7 @@ class Constraints:
         """Return the nearest possible coefficients, for each sign that a doubtful mass may have."""
         linear = self._linear(places, len(mean))
         bodies = [component for component in places if issubclass(component.effect, AddedBody)
-                  and component.effect.has_extent]
+                  and component.effect.bodies()]
         signs = []
         for component in bodies:
             at = places[component].start

@@ -18,7 +18,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from pprs_dynamics.drives import Column
-from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+from pprs_dynamics.errors import PprsError, UnreadableFileError, optional_library
 from pprs_dynamics.measurement.files.samples import Progress, Series
 
 KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.npy': 'NumPy',
@@ -190,21 +190,18 @@ def _labels(names: Any) -> list[str]:
 
 def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[str]],
              ) -> ArrayTable:
-    try:
-        from pyarrow.parquet import ParquetFile
-    except ImportError:
-        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'tables') from None
+    parquet = optional_library('pyarrow.parquet', 'pyarrow', 'reading Parquet files', 'tables')
 
     def load(wanted: Sequence[str]) -> Mapping[str, Any]:
         with _readable(path, 'Parquet'):
-            opened = [ParquetFile(file) for file in files]
+            opened = [parquet.ParquetFile(file) for file in files]
             require_size(path, sum(_parquet_size(file, wanted) for file in opened))
             tables = [file.read(list(wanted)) for file in opened]
             return {name: np.concatenate([_plain(table[name].to_numpy()) for table in tables])
                     for name in wanted}
 
     with _readable(path, 'Parquet'):
-        names = list(ParquetFile(files[0]).schema_arrow.names)
+        names = list(parquet.ParquetFile(files[0]).schema_arrow.names)
     return ArrayTable(path, names, load, labels)
 
 
@@ -228,10 +225,8 @@ def require_size(path: Path, size: int) -> None:
 def _plain(values: Any) -> Any:
     """Return a column of lists as an array, (N, K), and any other column unchanged."""
     if values.dtype == object and len(values) and isinstance(values[0], np.ndarray):
-        try:
+        with suppress(ValueError):  # lists of several lengths are no table
             return np.stack(list(values))
-        except ValueError:  # lists of several lengths are no table
-            return values
     return values
 
 

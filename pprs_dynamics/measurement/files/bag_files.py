@@ -13,8 +13,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
-from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag, require_rosbags
+from pprs_dynamics.errors import UnreadableFileError, optional_library
+from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag
 from pprs_dynamics.measurement.files.joint_states import (
     CONTROLLER,
     DYNAMIC,
@@ -204,12 +204,11 @@ def _stamps(samples: Samples) -> Indices:
 
 def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[str, Sequence[str]],
                      suffix: str) -> None:
-    require_rosbags('writing bags')
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
+    rosbag2 = optional_library('rosbags.rosbag2', 'rosbags', 'writing bags', 'bags')
     typestore = message_types()
     starts = [int(_stamps(samples).min()) for samples in topics.values() if len(samples.time)]
-    with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
+    plugin = rosbag2.StoragePlugin[STORAGE[suffix]]
+    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
         for topic, sentences in texts.items():
             connection = writer.add_connection(topic, LOG, typestore=typestore)
             first = min(starts, default=0)

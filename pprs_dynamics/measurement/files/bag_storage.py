@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError, optional_library
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.csv_files import ZSTANDARD, zstd
 from pprs_dynamics.measurement.files.joint_states import deserialized, message_types
@@ -148,14 +148,6 @@ class Bag:
         return store
 
 
-def require_rosbags(purpose: str) -> None:
-    """Raise MissingLibraryError where rosbags is not installed."""
-    try:
-        import rosbags.rosbag2  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError('rosbags', purpose, 'bags') from None
-
-
 @contextmanager
 def opened_bag(path: Path) -> Iterator[tuple[Bag, list[Defect]]]:
     """Open a bag directory, a folder of storage files, or one of these.
@@ -171,7 +163,7 @@ def opened_bag(path: Path) -> Iterator[tuple[Bag, list[Defect]]]:
         storages, findings = _storages_of(path)
         for storage in storages:
             _check_lengths(path, storage)
-        require_rosbags('reading bags')
+        optional_library('rosbags', 'rosbags', 'reading bags', 'bags')
         if any(storage.suffix in ZSTANDARD for storage in storages):
             folder = Path(stack.enter_context(TemporaryDirectory()))
             storages = [_unpacked(storage, folder) if storage.suffix in ZSTANDARD else storage

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.mechanism.state import PLATFORM, MechanismState
+from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
 
 
 @dataclass(frozen=True)
@@ -319,7 +319,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     card: ClassVar[Card]
     needs_several_drives: ClassVar[bool] = False
-    acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
+    acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM, MECHANISM})
     is_in_payload: ClassVar[bool] = False
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()

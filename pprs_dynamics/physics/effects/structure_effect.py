@@ -14,7 +14,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter, Product
-from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.description import Frame, body_at, inertial_in
 from pprs_dynamics.physics.mechanism.state import BodyPlace, MechanismState, StructureLoad
 
 # Linear parameters and variants of an effect at one place.
@@ -165,17 +165,10 @@ class AddedBody(BodyEffect):
     Class attributes
     ----------------
     places : tuple of BodyPlace
-    has_extent : bool
-        Whether centres and inertias are parameters, too.
     """
 
     places: ClassVar[tuple[BodyPlace, ...]] = ()
-    has_extent: ClassVar[bool]
     idealised = False
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        cls.has_extent = not all(place.is_spread for place in cls.places)
 
     @classmethod
     def of_place(cls, place: BodyPlace, is_alike: bool, moved: float) -> OfPlace:
@@ -201,7 +194,7 @@ class AddedBody(BodyEffect):
         By name of a coefficient: weights of coefficients.
         """
         return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
-                for prefix, centre in cls._bodies()
+                for prefix, centre in cls.bodies()
                 for axis, at in zip(AXES, centre, strict=True)}
 
     @classmethod
@@ -210,7 +203,7 @@ class AddedBody(BodyEffect):
         return f'{place.link}.' if cls.is_of_one_place else ''
 
     @classmethod
-    def _bodies(cls) -> list[tuple[str, tuple[float, float, float]]]:
+    def bodies(cls) -> list[tuple[str, tuple[float, float, float]]]:
         """Return prefix and centre of the places at which a body has a centre and an inertia."""
         return [(cls.prefix_of(place), place.centre) for place in cls.places if not place.is_spread]
 
@@ -219,7 +212,7 @@ class AddedBody(BodyEffect):
                ) -> dict[int, Array]:
         """Return columns by drive, exact for the bodies of some coefficients."""
         found = dict(rows)
-        for prefix, _ in cls._bodies():
+        for prefix, _ in cls.bodies():
             if mass := coefficients.get(f'{prefix}mass', 0.0):
                 away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
                                  for axis in AXES])
@@ -290,13 +283,12 @@ class AddedBody(BodyEffect):
                 continue
             mass, moment = c[0], np.array(c[1:4])
             xx, yy, zz, xy, xz, yz = c[4:]
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            if mass:
-                body = body_at(mass, tuple(np.array(place.centre) + moment / mass), inertia)
-            else:
-                # What a body of some mass changes by where its centre does.
-                inertia = inertia + _turned(np.array(place.centre), moment)
-                body = np.array([0.0, *moment, *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+            if mass:  # of which the inertia is about its own centre
+                body = body_at(mass, np.array(place.centre) + moment / mass,
+                               np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+            else:  # what a body of some mass changes by where its centre does
+                body = inertial_in(Frame(p=np.array(place.centre)), np.array(
+                    [0.0, *moment, xx, xy, yy, xz, yz, zz]))
             robot = robot.with_body(link, body)
         return robot
 

@@ -512,19 +512,18 @@ class DriveModel:
 
     def position_error(self, position: Array) -> Array:
         """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
-        errors = [e.position_error(self.drives, position) for e in self.position_effects]
-        return np.sum(errors, axis=0) if errors else np.zeros_like(position)
+        return sum((effect.position_error(self.drives, position)
+                    for effect in self.position_effects), np.zeros_like(position))
 
     def loaded_position_error(self, transmitted: Array) -> Array:
         """Return the errors of measured positions by what gears pass on, (N, D)."""
-        errors = [e.loaded_position_error(self.drives, transmitted) for e in self.position_effects]
-        return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
+        return sum((effect.loaded_position_error(self.drives, transmitted)
+                    for effect in self.position_effects), np.zeros_like(transmitted))
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
         """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
-        errors: Array = np.sum([e.windup_error(self.drives, transmitted, windup)
-                                for e in self.position_effects], axis=0)
-        return errors
+        return sum((effect.windup_error(self.drives, transmitted, windup)
+                    for effect in self.position_effects), np.zeros_like(windup))
 
 
 @dataclass(frozen=True)

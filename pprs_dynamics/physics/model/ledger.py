@@ -17,6 +17,7 @@ from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.model.keys import ANY, Key, as_list, below, blocks_below
+from pprs_dynamics.physics.model.parameter_file import flatten
 from pprs_dynamics.system.json_records import JsonRecord
 
 BLOCK = 'history'
@@ -103,14 +104,8 @@ class Step(JsonRecord):
 
     def as_values(self, prefix: str) -> dict[str, Any]:
         """Return flat keys and values of a model file, empty lists left out."""
-        flat: dict[str, Any] = {}
-        for name, value in vars(self).items():
-            if name == PREVIOUS:
-                flat.update((f'{prefix}.{PREVIOUS}.{key}', as_list(old))
-                            for key, old in value.items())
-            elif value != ():
-                flat[f'{prefix}.{name}'] = as_list(value)
-        return flat
+        return {key: as_list(value) for key, value in flatten(vars(self), f'{prefix}.')
+                if value not in ((), {})}
 
 
 def read_steps(values: Mapping[str, Any]) -> list[Step]:
@@ -200,21 +195,17 @@ def original_values(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
-    found: dict[str, Any] = {
-        PREVIOUS: below(block, f'{PREVIOUS}.')}
-    for entry in fields(Step):
-        key = f'{prefix}.{entry.name}'
-        if entry.name == PREVIOUS:
+    known = {entry.name: entry for entry in fields(Step)}
+    found: dict[str, Any] = {PREVIOUS: below(block, f'{PREVIOUS}.')}
+    for name, value in block.items():
+        if name.split('.')[0] == PREVIOUS:
             continue
-        if entry.name not in block:
-            if entry.default is NO_DEFAULT and entry.default_factory is NO_DEFAULT:
-                raise ModelError(key, MISSING, 'be given')
-            continue
-        found[entry.name] = _checked(key, block[entry.name], str(entry.type))
-    unknown = [name for name in block if name.split('.')[0] not in {f.name for f in fields(Step)}]
-    if unknown:
-        raise UnknownNameError('key', f'{prefix}.{unknown[0]}',
-                               [f'{prefix}.{entry.name}' for entry in fields(Step)])
+        if name not in known:
+            raise UnknownNameError('key', f'{prefix}.{name}', [f'{prefix}.{key}' for key in known])
+        found[name] = _checked(f'{prefix}.{name}', value, str(known[name].type))
+    for name, entry in known.items():
+        if name not in found and entry.default is NO_DEFAULT:
+            raise ModelError(f'{prefix}.{name}', MISSING, 'be given')
     return Step(**found)
 
 

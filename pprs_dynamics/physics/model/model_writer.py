@@ -14,7 +14,6 @@ column and lists over several lines. It also writes 1e-05, which is a word for Y
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Mapping
@@ -40,6 +39,7 @@ from pprs_dynamics.physics.model.parameter_values import LISTS, REFERENCE, UNCER
 from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.package_files import located
+from pprs_dynamics.system.plain_yaml import as_yaml
 
 WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is people's
 INDENT = '  '
@@ -48,7 +48,6 @@ COMMENT_COLUMN = 46
 # A key and its value, if that is on the same line, with the comment after it.
 ENTRY = re.compile(r'(?P<start> *(?P<name>[^\s#:][^:#]*): *)(?P<value>[^#\n]*?)(?P<space> *)'
                    r'(?P<comment>#.*)?\n?$')
-NOT_PLAIN = {'y', 'n', 'nan', 'inf'}  # words for YAML 1.1, not for ROS 2
 
 
 def write_model(path: str | PathLike[str], values: Mapping[str, Any],
@@ -197,7 +196,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
                 there.add(key.split('.')[0])
                 margin = indent if len(names) == 1 else margin
                 if key in new and entry['value']:
-                    line = f"{entry['start']}{_value(new.pop(key))}"
+                    line = f"{entry['start']}{as_yaml(as_list(new.pop(key)))}"
                     if entry['comment']:
                         line = f"{line.ljust(entry.start('comment') - 2)}  {entry['comment']}"
                     line += '\n'
@@ -208,7 +207,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
     whole = {key: value for key, value in new.items()
              if key in keys and key.split('.')[0] not in there}
     shift = ' ' * (margin - DEPTH * len(INDENT))
-    added = [*(f'{" " * margin}{key}: {_value(value)}' for key, value in new.items()
+    added = [*(f'{" " * margin}{key}: {as_yaml(as_list(value))}' for key, value in new.items()
                if key not in whole),
              *(shift + line for line in _lines(whole, DEPTH, keys)),
              *_effects_block(wanted, margin)]
@@ -252,7 +251,7 @@ def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
         if below:
             found += [start, *_lines(below, depth + 1, keys, f'{prefix}{name}.')]
             continue
-        line = f'{start} {_value(values[key])}'
+        line = f'{start} {as_yaml(as_list(values[key]))}'
         comment = _comment(key, keys)
         found.append(f'{line.ljust(COMMENT_COLUMN)}  # {comment}' if comment else line)
     return found
@@ -266,24 +265,6 @@ def _comment(key: str, keys: Mapping[str, Key]) -> str:
     parameter = find_parameter(rest) if block == 'effects' else None
     return ('' if parameter is None
             else f'{parameter.symbol}, {parameter.description} [{parameter.unit}]')
-
-
-class _Scalars(yaml.SafeDumper):
-    """Writer of values as ROS 2 and YAML 1.1 read them alike."""
-
-    def represent_word(self, word: str) -> yaml.Node:
-        """Return a word, quoted where ROS 2 might take it for a number or for true or false."""
-        style = None if word.isidentifier() and word.lower() not in NOT_PLAIN else '"'
-        return self.represent_scalar('tag:yaml.org,2002:str', word, style=style)
-
-
-_Scalars.add_representer(str, _Scalars.represent_word)
-
-
-def _value(value: Any) -> str:
-    text: str = yaml.dump(as_list(value), Dumper=_Scalars, default_flow_style=True,
-                          width=math.inf, allow_unicode=True)
-    return text.removesuffix('\n').removesuffix('\n...')
 
 
 def _same(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:

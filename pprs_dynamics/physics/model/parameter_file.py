@@ -76,7 +76,7 @@ def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any
     """Return the flat keys and values of a parameter file's text; `path` is named in errors."""
     flat: dict[str, Any] = {}
     model, ledger = _parameters_blocks(path, parse(text, path))
-    for key, value in (*_flatten(model), *_flatten(ledger)):
+    for key, value in (*flatten(model), *flatten(ledger)):
         if key in flat:
             raise ModelError(key, value, 'occur once: nested, with dots, or in a section of its '
                              'own', str(path))
@@ -106,13 +106,13 @@ def _parameters_blocks(path: object, content: Any) -> tuple[Mapping[str, Any], M
                 path, f'not a model file: {node} must contain a mapping ros__parameters')
         blocks[node] = block['ros__parameters']
     ledger = blocks.pop(LEDGER, {})
-    for key, value in _flatten(ledger):
+    for key, value in flatten(ledger):
         if not key.startswith('history'):
             raise ModelError(key, value, f'not be under {LEDGER}, which contains history alone',
                              str(path))
     if '/**' in blocks:
         for node, block in blocks.items():
-            for key, _ in _flatten(block) if node != '/**' else ():
+            for key, _ in flatten(block) if node != '/**' else ():
                 if key in NAMES or key.startswith(ADDED):
                     raise UnreadableFileError(
                         path, f'{key} of the model is under {node}: put it under /**, for '
@@ -124,9 +124,10 @@ def _parameters_blocks(path: object, content: Any) -> tuple[Mapping[str, Any], M
     return next(iter(blocks.values())), ledger
 
 
-def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+def flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield flat keys and values of nested ones; an empty block is a value."""
     for key, value in block.items():
         if isinstance(value, Mapping) and value:
-            yield from _flatten(value, f'{prefix}{key}.')
+            yield from flatten(value, f'{prefix}{key}.')
         else:
             yield f'{prefix}{key}', value

@@ -82,8 +82,7 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 
     A parameter for which the file has none is taken as exact.
     """
-    return {key: float(std)
-            for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
+    return {key: float(std) for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
@@ -193,7 +192,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of all keys, complete with defaults, and the added blocks as given."""
     values: dict[str, Any] = {}
     keys = keys_of(parameters)
-    _require_known(parameters)
+    _require_known(parameters, keys)
     for name, key in keys.items():
         if name in parameters:
             values[name] = key.check(parameters[name])
@@ -208,8 +207,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
                          if name.startswith(ADDED)}}
 
 
-def _require_known(parameters: Mapping[str, Any]) -> None:
-    keys = keys_of(parameters)
+def _require_known(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
     in_blocks = (*keys, *ADDED, *(NAMED if is_described(parameters) else ()))
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):

@@ -15,7 +15,6 @@ from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-LINK, DRIVE = 'link', 'drive'
 JOINED = 1e-6  # of the robot's size: joints closer than that are one point
 
 
@@ -27,17 +26,15 @@ class Line:
     ----------
     start, end : int
         Of the points.
-    kind : {'link', 'drive'}
     drive : int
-        That moves along it or turns it, or -1.
+        That moves along it or turns it; -1 for none.
     name : str
     """
 
     start: int
     end: int
-    kind: str = LINK
-    drive: int = -1
-    name: str = ''
+    drive: int
+    name: str
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,7 @@ def _of_links(links: LinkMotion) -> Skeleton:
         if np.linalg.norm(points[row][0] - points[end][0]) > JOINED * size:
             d = driven.get(joint, -1) if joint in driven and not t.turns[joint] else (
                 driven.get(row, -1))
-            lines.append(Line(row, end, LINK if d < 0 else DRIVE, d, name))
+            lines.append(Line(row, end, d, name))
 
     for name, row in s.rows.items():
         join(int(t.parent[row]), row, row, name)

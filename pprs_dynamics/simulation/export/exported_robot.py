@@ -35,6 +35,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, EQUATIONS, JOINTS, ROBOT
+from pprs_dynamics.physics.model.robot_block import STANDARD_GRAVITY
 from pprs_dynamics.physics.three_pprs.robot import HINGES
 
 MJCF, URDF = 'mjcf', 'urdf'
@@ -43,7 +44,6 @@ DAMPING, FRICTION, ARMATURE, STIFFNESS = 'damping', 'frictionloss', 'armature', 
 SPRINGREF = 'springref'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
-STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
 # Of effects on drives: their parameters as a joint's.
 OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
     ViscousFriction: {'coefficient': DAMPING},

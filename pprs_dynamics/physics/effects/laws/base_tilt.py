@@ -11,7 +11,6 @@ from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class BaseTilt(BodyEffect):
@@ -44,7 +43,6 @@ class BaseTilt(BodyEffect):
     """
 
     name = 'base_tilt'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     idealised = False
     nonlinear = True
     # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in

@@ -9,7 +9,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
+from pprs_dynamics.physics.mechanism.state import MechanismState, StructureLoad
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
 MOMENTS = tuple(f'moment_{axis}' for axis in 'xyz')
@@ -46,7 +46,6 @@ class ExternalWrench(BodyEffect):
     """
 
     name = 'external_wrench'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     nonlinear = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',

@@ -18,7 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import OfPlace, PassiveJointEffect
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, Reversal
+from pprs_dynamics.physics.mechanism.state import MechanismState, Reversal
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 
@@ -56,7 +56,6 @@ class JointFrictionEffect(PassiveJointEffect):
     """
 
     name = 'joint_friction'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_friction = True
     is_of_one_place = True
     linear = ()

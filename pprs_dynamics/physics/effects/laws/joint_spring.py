@@ -13,7 +13,7 @@ from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.physics.effects.effect import Parameter, Product
 from pprs_dynamics.physics.effects.laws.drive_spring import FARTHEST
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, OfPlace
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
+from pprs_dynamics.physics.mechanism.state import MechanismState, StructureLoad
 
 
 class JointSpring(BodyEffect):
@@ -46,7 +46,6 @@ class JointSpring(BodyEffect):
     """
 
     name = 'joint_spring'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_of_one_place = True
     linear = ()
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 from pprs_dynamics.physics.effects.structure_effect import AddedBody
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class LinkMass(AddedBody):
@@ -44,7 +43,6 @@ class LinkMass(AddedBody):
     """
 
     name = 'link_mass'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_of_one_place = True
     linear = ()
 

@@ -9,7 +9,7 @@ from math import inf
 from typing import Any
 
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, body_parameters
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, BodyPlace
+from pprs_dynamics.physics.mechanism.state import BodyPlace
 
 
 class PayloadMass(AddedBody):
@@ -42,7 +42,6 @@ class PayloadMass(AddedBody):
     """
 
     name = 'payload_mass'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     places = (BodyPlace('the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
     linear = body_parameters('', 'the tool', (0.0, 0.0, 0.0), inf)[:1]
 

@@ -10,7 +10,6 @@ from typing import Any
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import about_centre, body_at, inertial_in
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
 
 
 class PayloadOffset(BodyEffect):
@@ -43,7 +42,6 @@ class PayloadOffset(BodyEffect):
     """
 
     name = 'payload_offset'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_in_payload = True
     idealised = False
     nonlinear = True

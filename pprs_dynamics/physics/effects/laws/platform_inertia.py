@@ -10,10 +10,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM
-
-MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+from pprs_dynamics.physics.effects.structure_effect import MOMENTS, PRODUCTS, BodyEffect
 
 
 class PlatformInertia(BodyEffect):
@@ -44,7 +41,6 @@ class PlatformInertia(BodyEffect):
     """
 
     name = 'platform_inertia'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_in_payload = True
     idealised = False
     linear = (

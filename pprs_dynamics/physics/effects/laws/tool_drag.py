@@ -9,7 +9,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState, StructureLoad
+from pprs_dynamics.physics.mechanism.state import MechanismState, StructureLoad
 
 
 class ToolDrag(BodyEffect):
@@ -41,7 +41,6 @@ class ToolDrag(BodyEffect):
     """
 
     name = 'tool_drag'
-    acts_in = frozenset({PLATFORM, MECHANISM})
     is_friction = True
     needs_several_drives = True  # of a single one it is viscous friction
     linear = (
