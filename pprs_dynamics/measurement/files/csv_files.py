@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import os
 import re
 import zlib
 from codecs import getincrementaldecoder
@@ -166,7 +165,10 @@ class CsvTable:
                 file.readline()
             while lines := file.readlines(BLOCK):
                 unpacked += sum(map(len, lines))
-                _check_unpacked(self.path, unpacked if is_packed else 0)
+                if is_packed and unpacked > LARGEST_UNPACKED:
+                    raise UnreadableFileError(
+                        self.path, f'it unpacks to more than {LARGEST_UNPACKED / 1e9:g} GB: '
+                        'unpack it, or split it into several files')
                 blocks.append(self._numbers(lines, row, used, dates))
                 row += len(lines)
                 if progress is not None:
@@ -207,18 +209,15 @@ class CsvTable:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
 
-        def rows() -> Iterator[tuple[int, list[str]]]:
-            """Yield the cells of rows with their numbers."""
-            return ((number, self._row(number, line)) for number, line in enumerate(lines, start)
-                    if not line.isspace() and line not in self.heads)
-
-        kept = [line for line in lines if not line.isspace() and line not in self.heads]
-        content = ''.join(kept)
+        kept = [(number, line) for number, line in enumerate(lines, start)
+                if not line.isspace() and line not in self.heads]
+        content = ''.join(line for _, line in kept)
         counts = {len(line.split()) if self.separator == BLANK else line.count(self.separator) + 1
-                  for line in kept}
+                  for _, line in kept}
         # pandas fills short rows, and takes a quote without its pair for the beginning of a cell.
         if counts - {self.count} or '"' in content:
-            list(rows())  # raises an error for a row that is none
+            for number, line in kept:
+                self._row(number, line)
         # From pandas 3.1 on, numbers are always exact and the argument is deprecated.
         exact = ({'float_precision': 'round_trip'}
                  if tuple(map(int, pd.__version__.split('.')[:2])) < (3, 1) else {})
@@ -235,7 +234,8 @@ class CsvTable:
         except ValueError:
             pass
         return np.array([[self._number(number, cells, column, column in dates) for column in used]
-                         for number, cells in rows()]).reshape(-1, len(used))
+                         for number, line in kept for cells in [self._row(number, line)]]
+                        ).reshape(-1, len(used))
 
     def _row(self, number: int, line: str) -> list[str]:
         """Return the cells of a row, or raise UnreadableFileError if it is none of this table."""
@@ -337,20 +337,10 @@ def _encoding(path: Path, content: IO[bytes]) -> str:
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:
     if path.suffix == '.gz':
-        # Its last four bytes are the length of what was packed.
-        raw.seek(-min(4, path.stat().st_size), os.SEEK_END)
-        _check_unpacked(path, int.from_bytes(raw.read(), 'little'))
-        raw.seek(0)
         return cast('IO[bytes]', gzip.GzipFile(fileobj=raw))
     if path.suffix in ZSTANDARD:
         return cast('IO[bytes]', zstd().open(raw, 'rb'))
     return raw
-
-
-def _check_unpacked(path: Path, size: int) -> None:
-    if size > LARGEST_UNPACKED:
-        raise UnreadableFileError(path, f'it unpacks to more than {LARGEST_UNPACKED / 1e9:g} GB: '
-                                  'unpack it, or split it into several files')
 
 
 def zstd() -> Any:

@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
-from pprs_dynamics.errors import UnreadableFileError, meant
+from pprs_dynamics.errors import UnreadableFileError, suggestion
 from pprs_dynamics.measurement.files.array_files import KINDS, ArrayTable, open_arrays
 from pprs_dynamics.measurement.files.csv_files import CsvTable
 from pprs_dynamics.measurement.files.merged_states import at_stamps
@@ -204,10 +204,9 @@ def _require(table: Table, wanted: Sequence[Column]) -> None:
                 + (f'write the number of the right one, {" or ".join(places)}'
                    if isinstance(table, CsvTable) else 'rename one of them'))
         if table.place(column) is None:
-            close = meant(str(column), table.names)
             raise UnreadableFileError(
-                table.path, f'no column {column!r}' + (f' (did you mean {close}?)' if close else '')
-                + '; it contains ' + (', '.join(sorted(table.names)[:MOST]) or (
+                table.path, f'no column {column!r}{suggestion(str(column), table.names)}'
+                '; it contains ' + (', '.join(sorted(table.names)[:MOST]) or (
                     f'{counted(getattr(table, "count", 0), "column")} without a header, must be '
                     'numbers from 1')))
 

@@ -98,13 +98,13 @@ class Key:
         kind = 'name' if self.is_text else 'finite number'
         form = (f'a {kind}' if self.size is None else f'a list of {kind}s' if self.is_text
                 or self.size == ANY else f'a list of {self.size} {kind}s')
-        bounds = [text for text, is_bound in (
-            ('greater than 0', self.positive),
-            (f'at least {self.lower:g}', self.lower > -math.inf and not self.positive),
-            (f'at most {self.upper:g}', self.upper < math.inf)) if is_bound]
+        has_lower, has_upper = self.lower > -math.inf, self.upper < math.inf
+        bounds = (f'between {self.lower:g} and {self.upper:g}' if has_lower and has_upper else
+                  ' and '.join(text for text, is_bound in (
+                      ('greater than 0', self.positive), (f'at least {self.lower:g}', has_lower),
+                      (f'at most {self.upper:g}', has_upper)) if is_bound))
         unit = f' [{self.unit}]' if self.unit else ''
-        return ' '.join(('be', form, *[' and '.join(bounds)] * bool(bounds),
-                         f'({self.description}{unit})'))
+        return ' '.join(filter(None, ('be', form, bounds, f'({self.description}{unit})')))
 
     def check(self, value: Any) -> Any:
         """Return the value as a word, a float or a tuple of these, or raise ModelError."""

@@ -174,8 +174,7 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         if not (keys[target].is_number if target in keys else parameter and parameter.expected):
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
-            raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
+        Key(name, 'a relative tolerance', lower=0, upper=1).check(value)
 
 
 @contextmanager
