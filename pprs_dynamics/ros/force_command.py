@@ -309,7 +309,8 @@ class Feedforward:
         if duration < SHORTEST_STOP or not (velocity[-1].any() or acceleration[-1].any()):
             return found
         rest = np.zeros_like(velocity[-1:])
-        stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, *self._limits.strokes)
+        stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, self._limits.lower,
+                       self._limits.upper)
         try:
             # Over so short a way gravity's efforts hardly change.
             effort = self.hold(gravity=True).effort
@@ -384,7 +385,7 @@ class Feedforward:
         last = self._accepted()
         now = (int(last.request.offsets[-1]) - left) / NANOSECONDS
         path = _path_of(last).stop(now, duration)
-        lower, upper = self._limits.strokes
+        lower, upper = self._limits.lower, self._limits.upper
         motion = self._model.robot.motion_of_drives(
             np.clip(path.position, lower, upper), path.velocity, path.acceleration)
         forces = self._model.sound_at(motion).drive_forces(motion)

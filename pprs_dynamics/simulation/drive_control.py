@@ -95,6 +95,8 @@ class DriveControl:
 
     Attributes
     ----------
+    holding : bool
+        True where no command is followed.
     notes : list of Note
         One for every change for the worse, not one for every step.
     """
@@ -118,11 +120,6 @@ class DriveControl:
         self._delay_line.clear()
         self._wanted_speed: tuple[Array, Array] | None = None
         self._hold(position)
-
-    @property
-    def holding(self) -> bool:
-        """True where no command is followed."""
-        return self._held
 
     def command(self, now: float, setpoint: Setpoint, following: Setpoint | None = None,
                 after: float = 0.0, taken: float | None = None) -> bool:
@@ -150,7 +147,7 @@ class DriveControl:
             return False
         self._taken = now if taken is None else taken
         self._since = max(now, self._taken - LONGEST_LATE)
-        self._setpoint, self._held = setpoint, False
+        self._setpoint, self.holding = setpoint, False
         if following is not None and self._fault(following):
             following = None  # refused when its time comes
         self._following, self._after = following, after
@@ -170,7 +167,7 @@ class DriveControl:
             As measured.
         """
         silence = now - self._taken
-        if not self._held and silence > self.settings.command_timeout + 1e-9:
+        if not self.holding and silence > self.settings.command_timeout + 1e-9:
             self._note(now, 'HOLD', f'no command for {silence:.3g} s: the drives hold')
             self._hold(position)
         age = now - self._since
@@ -213,7 +210,7 @@ class DriveControl:
 
     def _hold(self, position: Array) -> None:
         self._since = self._taken = 0.0
-        self._held = True
+        self.holding = True
         self._following, self._after = None, 0.0
         self._setpoint = Setpoint(np.array(position), self._nothing)
         # Holding against gravity without it would sag by millimetres.

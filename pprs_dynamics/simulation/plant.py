@@ -129,7 +129,7 @@ class Plant(Injecting):
         self.inject(names, seed, scale)
         home, _ = s.room(np.pi)  # where motions that are drawn begin
         self.limits = self.model.limits
-        self.lower, self.upper = self.limits.strokes
+        self.lower, self.upper = self.limits.lower, self.limits.upper
         with np.errstate(invalid='ignore'):
             span = self.upper - self.lower
         self._span = np.where(np.isfinite(span), span, 2 * np.pi)

@@ -130,6 +130,7 @@ class SimulatedRobot:
         self.control = DriveControl(
             plant.limits, plant.holding, control or plant.gains(BANDWIDTH, DAMPING_RATIO), step,
             self.sensors.smoothing)
+        self.notes = self.control.notes
         self._ticks = 0
         self.place(plant.position)
 
@@ -137,11 +138,6 @@ class SimulatedRobot:
     def time(self) -> float:
         """Time since the start [s]."""
         return self._ticks * self.steps_per_tick * self.plant.time_step
-
-    @property
-    def notes(self) -> list[Note]:
-        """Messages of the robot so far."""
-        return self.control.notes
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
         """Put the drives at positions (D,) [m, rad], at rest or with velocities [m/s, rad/s].

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Numbers in text: of the command line, of CSV files, and for JSON.
+"""Numbers in text: of the command line and of CSV files.
 
 Python's own `float` and `int` read more than people mean: `1_0` as ten, and digits of every
 script.
@@ -10,7 +10,6 @@ script.
 from __future__ import annotations
 
 import re
-from math import isfinite
 
 LONGEST = 400  # characters; Python refuses to read whole numbers of thousands
 NUMBER = re.compile(r'[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf|infinity)',
@@ -43,8 +42,3 @@ def parse_whole(text: str) -> int:
     if len(text) > LONGEST or not WHOLE.fullmatch(text):
         raise ValueError(f'{text[:30]!r} is no whole number')
     return int(text)
-
-
-def finite(value: float | None) -> float | None:
-    """Return a number that JSON has, or None."""
-    return float(value) if value is not None and isfinite(value) else None

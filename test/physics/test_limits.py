@@ -24,7 +24,7 @@ EACH = pytest.mark.parametrize('limits', [PAPER, ARM], ids=['3-PPRS', 'arm'])
 
 def middle(limits: DriveLimits, samples: int = 4) -> np.ndarray:
     """Return positions within all strokes, (N, D)."""
-    lower, upper = limits.strokes
+    lower, upper = limits.lower, limits.upper
     return np.tile((lower + upper) / 2, (samples, 1))
 
 
@@ -38,7 +38,7 @@ def test_efforts_are_moved_to_the_limit_where_they_are_over_it(limits: DriveLimi
 
 @EACH
 def test_the_first_position_outside_its_stroke_is_named(limits: DriveLimits) -> None:
-    lower, upper = limits.strokes
+    lower, upper = limits.lower, limits.upper
     edges = middle(limits)
     edges[0], edges[1] = lower, upper
     limits.check_strokes(edges)

@@ -148,7 +148,7 @@ def test_a_stop_never_leads_beyond_a_stroke() -> None:
     node.answer(request(1.0, 1))
     answer = node.answer(TrajectoryRequest(HelicalPath().motion([1.01]), 0, np.array([0])))
     q = node.ending_at_rest(answer, 2.0).drive_motion[0]
-    lower, upper = narrow.limits.strokes
+    lower, upper = narrow.limits.lower, narrow.limits.upper
     assert ((q[-1] >= lower) & (q[-1] <= upper)).all()
 
 

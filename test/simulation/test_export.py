@@ -39,7 +39,7 @@ def text_of(model: Any, kind: str) -> str:
 
 def replay_error(model: DriveModel, kind: str) -> float:
     robot = export_robot(model, kind)
-    return float(replay(model, robot, written(robot, kind), kind).error.max())
+    return float(replay(model, robot, written(robot, kind), kind)[0].max())
 
 
 def without_loads(model: DriveModel, kind: str) -> float:

@@ -15,7 +15,7 @@ from typing import Any, TypedDict
 
 from pprs_dynamics.app.commands.arguments import UsageError, output_file, write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
-from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.simulation.export.exported_robot import (
@@ -25,7 +25,7 @@ from pprs_dynamics.simulation.export.exported_robot import (
     export_robot,
     written,
 )
-from pprs_dynamics.simulation.export.replay import Replayed, replay
+from pprs_dynamics.simulation.export.replay import replay
 from pprs_dynamics.system.files import write_text
 from pprs_dynamics.system.plain_text import displayed, first_of
 
@@ -74,23 +74,24 @@ def run(options: argparse.Namespace) -> int:
                          'from it, must be another name for --output')
     robot = export_robot(model, options.to)
     text = written(robot, options.to)
-    found = replay(model, robot, text, options.to)
+    error, effort = replay(model, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
         write_json(options.json, ExportJson(
-            not_expressed=list(robot.not_expressed), replay_error=root_mean_square(found.error),
-            effort=root_mean_square(found.effort)))
-    _print_summary(screen, model, found, robot.not_expressed)
+            not_expressed=list(robot.not_expressed), replay_error=root_mean_square(error),
+            effort=root_mean_square(effort)))
+    _print_summary(screen, model, error, effort, robot.not_expressed)
     screen.print(f'{options.to}: {shown(options.output)}', soft_wrap=True)
     return 0
 
 
-def _print_summary(screen: Any, model: DriveModel, found: Replayed, left: tuple[str, ...]) -> None:
+def _print_summary(screen: Any, model: DriveModel, error: Array, effort: Array,
+                   left: tuple[str, ...]) -> None:
     screen.print('Replayed in MuJoCo: the efforts of the model and the error of the file, rms')
     screen.print(text_table(
         ('drive', 'effort', 'error'),
         [(shown(name), *(f'{number:.3g} {unit}' for number in numbers))
          for name, unit, *numbers in zip(
-             model.drives, (units.effort for units in model.units), found.effort, found.error,
+             model.drives, (units.effort for units in model.units), effort, error,
              strict=True)]))
     screen.print(f'Not expressed in the file: {shown(first_of(left, FEW) or "nothing")}')

@@ -25,7 +25,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.json_records import for_json
-from pprs_dynamics.system.numbers import finite
 
 
 class Session:
@@ -135,7 +134,7 @@ class Session:
                 'revision': ticks.revision, 'fitted_since': ticks.fitted_since,
                 'stage': view.stage, 'is_settled': view.is_settled,
                 'is_approximate': view.is_approximate,
-                'departure': finite(view.departure), 'notice': view.notice,
+                'departure': for_json(view.departure), 'notice': view.notice,
                 'drives': list(fits.drives),
                 'errors': for_json(self.errors()),
                 'overall': for_json(self.overall()), **view_state.units_to_dict(model),

@@ -25,7 +25,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.numbers import finite
+from pprs_dynamics.system.json_records import for_json
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
 # cost is lowest; and the fitted model evaluated.
@@ -207,7 +207,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], fits: TickFit
     return {
         'name': effect.name, 'is_ticked': tick is not None,
         'drives': candidate and fits.design.named(candidate.drives),
-        'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
+        'is_on_drives': issubclass(effect, DriveEffect), 'evidence': for_json(evidence),
         'evidence_terms': '' if without is None else word_terms(without),
         'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
         'nonlinear': effect.nonlinear,
@@ -237,8 +237,8 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], fits: TickFits,
         unit = units.get(drive, DriveUnits())
         parameter = known[name].of(unit.turns)
         rows.append({
-            'key': key, 'symbol': parameter.symbol, 'value': finite(estimate.value),
-            'std': finite(estimate.std), 'description': parameter.description,
+            'key': key, 'symbol': parameter.symbol, 'value': for_json(estimate.value),
+            'std': for_json(estimate.std), 'description': parameter.description,
             'unit': unit.of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
@@ -258,8 +258,8 @@ def recordings_to_dict(recordings: Mapping[str, Recording], fits: TickFits, now:
         found.append({
             'key': key, 'name': recording.name,
             'start': float(time[part][0]), 'end': float(time[part][-1]),
-            'before': finite(root_mean_square(fits.before[part])),
-            'now': finite(root_mean_square(now[part])),
+            'before': for_json(root_mean_square(fits.before[part])),
+            'now': for_json(root_mean_square(now[part])),
             'findings': [finding.text for finding in recording.findings]})
     return found
 

@@ -123,7 +123,7 @@ def room(model: DriveModel) -> tuple[Array, Array]:
     if model.moves_joints:
         middle, reach = model.robot.structure.room(WIDEST)
         return middle, reach
-    lower, upper = model.limits.strokes
+    lower, upper = model.limits.lower, model.limits.upper
     return (lower + upper) / 2, (upper - lower) / 2
 
 

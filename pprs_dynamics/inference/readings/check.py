@@ -203,7 +203,7 @@ class Search:
 
         Limits of a turn or more of a motor without weight are invented, as URDF asks for some.
         """
-        lower, upper = self.model.limits.strokes
+        lower, upper = self.model.limits.lower, self.model.limits.upper
         evidence = self.evidence(self.rows[0])
         if evidence is None:
             return lower, upper

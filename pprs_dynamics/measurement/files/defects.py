@@ -191,7 +191,8 @@ class Judgement:
 
     def _judge_regularity(self) -> None:
         time = self.samples.time
-        spreads = [((part.start, part.stop - 1), *stamps.spread(time, part))
+        spreads = [((part.start, part.stop - 1), *np.quantile(
+            np.diff(time[part]), (0.05, 0.5, 0.95)).tolist())
                    for part in stamps.stretches(self._starts, len(time))
                    if part.stop - part.start >= SHORTEST_SEGMENT]
         irregular = [(place, low, high) for place, low, step, high in spreads

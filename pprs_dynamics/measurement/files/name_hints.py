@@ -10,12 +10,11 @@ from collections.abc import Collection, Sequence
 from pprs_dynamics.errors import meant
 
 MOST = 12  # names of a file that are listed
-INIT = '`pprs init ROBOT.urdf {} --output robot.yaml` writes a model file that reads it'
 
 
 def init_command(name: str) -> str:
     """Return the sentence that names the command which writes a model file."""
-    return INIT.format(name)
+    return f'`pprs init ROBOT.urdf {name} --output robot.yaml` writes a model file that reads it'
 
 
 def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> str:

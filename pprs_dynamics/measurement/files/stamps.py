@@ -121,9 +121,3 @@ def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     lost = (steps > LOST_STEPS * step) & not_made_up & ~gap & (not is_irregular)
     return (part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost),
             int(np.sum(np.rint(counts[lost]) - 1)))
-
-
-def spread(time: Array, part: slice) -> tuple[float, float, float]:
-    """Return the 5 %, 50 % and 95 % points of the steps of a stretch [s]."""
-    low, middle, high = np.quantile(np.diff(time[part]), (0.05, 0.5, 0.95)).tolist()
-    return low, middle, high

@@ -114,28 +114,24 @@ def smooth_drives(recording: Recording, window: float | None = None,
 
     duration = block_duration(motion_bandwidth(stretches, smoothing) if blocks_per_period
                               else 0.0, blocks_per_period)
-    block = _block(recording, segments, grids, duration, notes)
-    pieces: list[tuple[np.ndarray, np.ndarray, SamplingGrid]] = []
+    duration = _mean_over(recording, segments, grids, duration, notes)
+    count, index, spans, blocks, used = 0, [], [], [], []
     for part, grid in zip(segments, grids, strict=True):
         filter_ = smoothing.polynomial(grid.step)
-        kept, starts = _blocks(grid, filter_.half, block or block_length(grid.step, duration))
+        kept, starts = _blocks(grid, filter_.half, block_length(grid.step, duration))
         if len(starts):
-            pieces.append((np.arange(part.start + kept.start, part.start + kept.stop), starts,
-                           grid))
-    if not pieces:
+            blocks.append(count + starts)
+            index.append(np.arange(part.start + kept.start, part.start + kept.stop))
+            spans.append(slice(count, count := count + len(index[-1])))
+            used.append(grid)
+    if not used:
         raise MotionError(
             'recording', f'its longest segment has {max(s.stop - s.start for s in segments)} '
             'samples', f'have more than {filter_.window}, one smoothing window', 'shape')
-    index, blocks, used = zip(*pieces, strict=True)
-    lengths = np.array(list(map(len, index)))
-    firsts = np.cumsum(lengths) - lengths
-    longest, none = used[int(np.argmax(lengths))], np.zeros(0)
+    longest, none = used[int(np.argmax(list(map(len, index))))], np.zeros(0)
     motion = DriveMotion(
-        none, none, none, np.concatenate(index),
-        tuple(slice(first, first + count) for first, count in zip(
-            firsts.tolist(), lengths.tolist(), strict=True)),
-        np.concatenate([starts + first for starts, first in zip(blocks, firsts, strict=True)]),
-        block or block_length(longest.step, duration), smoothing, used, recorded, tuple(notes))
+        none, none, none, np.concatenate(index), tuple(spans), np.concatenate(blocks),
+        block_length(longest.step, duration), smoothing, tuple(used), recorded, tuple(notes))
     q, q_dot, q_ddot = smoothed_as(motion, recording, lambda position: position)
     if np.any(recorded):
         assert recording.velocity is not None
@@ -292,11 +288,11 @@ def _velocity_notes(recording: Recording, recorded: np.ndarray) -> list[str]:
                      'differentiated positions']
 
 
-def _block(
+def _mean_over(
     recording: Recording, segments: Sequence[slice], grids: Sequence[SamplingGrid],
     duration: float, notes: list[str],
-) -> int | None:
-    """Return 1 where efforts are too sparse for blocks, else None."""
+) -> float:
+    """Return the duration of blocks [s], 0 for single samples where efforts are too sparse."""
     measured = whole = 0
     for part, grid in zip(segments, grids, strict=True):
         known = np.isfinite(recording.effort[part])
@@ -307,11 +303,11 @@ def _block(
     if measured and whole < SPARSE_EFFORTS * measured:
         notes.append('efforts come less often than positions: single samples are compared, '
                      'without a mean')
-        return 1
+        return 0.0
     block = block_length(grids[0].step, duration)
     notes.append(f'effort and model are both averaged over blocks of {counted(block, "sample")}. A '
                  'block with a missing effort does not count')
-    return None
+    return duration
 
 
 def _blocks(grid: SamplingGrid, edge: int, block: int) -> tuple[slice, np.ndarray]:

@@ -554,7 +554,7 @@ def margins(model: DriveModel, mechanism: MechanismState) -> Margins:
     mechanism : MechanismState
         What `model.drive_forces` returned with the forces.
     """
-    lower, upper = model.limits.strokes
+    lower, upper = model.limits.lower, model.limits.upper
     position = mechanism.position
     with np.errstate(invalid='ignore'):  # no limit of a joint: infinity over infinity
         room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (

@@ -160,11 +160,6 @@ class DriveLimits:
     sources: tuple[str, ...]
     effort_source: str
 
-    @property
-    def strokes(self) -> tuple[Array, Array]:
-        """Lowest and highest position of each drive [m, rad], (D,) each."""
-        return self.lower, self.upper
-
     def with_efforts(self, effort: Sequence[float]) -> DriveLimits:
         """Return these limits with the smaller of two limits on every drive's effort."""
         return replace(self, efforts=np.minimum(self.efforts, effort))
@@ -175,7 +170,7 @@ class DriveLimits:
 
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, D), outside its stroke."""
-        lower, upper = self.strokes
+        lower, upper = self.lower, self.upper
         outside = ~((positions >= lower) & (positions <= upper))
         if np.any(outside):
             sample, drive = (int(i) for i in np.argwhere(outside)[0])

@@ -207,11 +207,6 @@ class Body:
     home: float
 
     @property
-    def tensor(self) -> Array:
-        """Inertia about the centre in the body's axes, (3, 3) [kg m^2]."""
-        return self.axes @ np.diag(self.moments) @ self.axes.T
-
-    @property
     def limits(self) -> tuple[float, float] | None:
         """Range of the joint, None where it is not limited."""
         found = self.joint.lower, self.joint.upper
@@ -505,7 +500,7 @@ def _urdf(robot: ExportedRobot) -> Element:
     for body in robot.bodies:
         link = _add(root, 'link', name=body.name)
         inertial = _add(link, 'inertial')
-        tensor = body.tensor
+        tensor = body.axes @ np.diag(body.moments) @ body.axes.T
         _add(inertial, 'origin', xyz=body.centre, rpy='0 0 0')
         _add(inertial, 'mass', value=body.mass)
         _add(inertial, 'inertia', ixx=tensor[0, 0], ixy=tensor[0, 1], ixz=tensor[0, 2],

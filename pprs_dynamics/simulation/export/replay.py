@@ -9,7 +9,6 @@ engine's soft constraints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -70,24 +69,16 @@ def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion
     return efforts
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """Result of a replay.
+def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> tuple[Array, Array]:
+    """Replay a short motion of the model in MuJoCo; see `file_efforts`.
 
-    Parameters
-    ----------
+    Returns
+    -------
     error : (D,) array
         Root mean square of the model's efforts less those of the file [N, N m].
     effort : (D,) array
         Root mean square of the model's efforts.
     """
-
-    error: Array
-    effort: Array
-
-
-def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Replayed:
-    """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
     motion: Any = (draw_motion(model, DURATION, 0) if model.moves_joints else Excitation(
         duration=DURATION).motion(np.arange(0.0, DURATION, 1 / RATE)))
     state = model.initial_state()
@@ -95,4 +86,4 @@ def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> Rep
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
     error, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
         forces.total - by_file, forces.total))
-    return Replayed(error, effort)
+    return error, effort

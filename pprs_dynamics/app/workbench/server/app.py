@@ -46,7 +46,6 @@ from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.json_records import for_json
-from pprs_dynamics.system.numbers import finite
 
 LARGEST = float_info.max  # whole numbers of JSON may be larger
 UPLOAD = '/api/upload'
@@ -282,8 +281,8 @@ class Api:
             mask = span_mask(ticks, *body.range('time'), None if drive is None else [str(drive)])
         fits, view = ticks.fits, ticks.view
         return JSONResponse({'shares': [asdict(share) for share in shares_in(mask, fits, view)],
-                             'before': finite(root_mean_square(fits.before[mask])),
-                             'now': finite(root_mean_square(view.residual[mask])),
+                             'before': for_json(root_mean_square(fits.before[mask])),
+                             'now': for_json(root_mean_square(view.residual[mask])),
                              'spans': spans_of(fits.design.residuals, mask),
                              'samples': int(mask.sum()), 'revision': ticks.revision})
 
