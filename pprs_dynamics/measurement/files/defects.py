@@ -61,7 +61,7 @@ class Judgement:
         self.samples = samples
         self.findings = list(samples.findings)
         self.segments: tuple[slice, ...] = ()
-        self._starts: Indices = np.zeros(1, dtype=np.int64)
+        self._stretch: Indices = np.zeros(len(samples.time), dtype=np.int64)  # numbers of them
         self._drop_non_finite()
         if not len(self.samples.time):
             return
@@ -97,16 +97,13 @@ class Judgement:
         self._tell_samples(kind, np.any(mask, axis=1), what.format(', '.join(drives)), drives)
 
     def _keep(self, mask: Mask) -> None:
-        """Drop samples, and move the starts of stretches with them."""
-        if np.all(mask):
-            return
-        before = np.concatenate(([0], np.cumsum(mask)))
-        self.samples = self.samples.taken(mask)
-        starts = np.unique(before[self._starts])
-        self._starts = starts[starts < max(len(self.samples.time), 1)]
+        """Drop the other samples."""
+        if not np.all(mask):
+            self.samples, self._stretch = self.samples.taken(mask), self._stretch[mask]
 
     def _split(self, firsts: Indices) -> None:
-        self._starts = np.union1d(self._starts, firsts.astype(np.int64))
+        """Let stretches begin at samples."""
+        self._stretch += np.searchsorted(firsts, np.arange(len(self._stretch)), side='right')
 
     def _mark_impossible(self, quantity: str) -> Mask:
         """Replace damaged numbers by NaN, and return where: beyond all measurement, or far off."""
@@ -143,10 +140,10 @@ class Judgement:
                        f'{time[first - 1]:.6g} s to {time[first]:.6g} s,',
                        [(int(k), int(k)) for k in resets])
         self._split(resets)
-        late = stamps.late_samples(time, self._starts)
+        late = stamps.late_samples(time, self._stretch)
         self._tell_samples('unordered_stamps', late, 'out of order', noun='stamp')
         if np.any(late):
-            self.samples = self.samples.taken(stamps.sorted_order(time, self._starts))
+            self.samples = self.samples.taken(np.lexsort((time, self._stretch)))
         same = stamps.duplicates(self.samples.time)
         self._tell_samples('duplicate_stamps', same, 'with the stamp of another')
         self._keep(~same)
@@ -179,7 +176,7 @@ class Judgement:
     def _judge_spacing(self) -> None:
         time = self.samples.time
         gaps, losses, counts = zip(*(stamps.gaps(time, part) for part in stamps.stretches(
-            self._starts, len(time))), strict=True)
+            self._stretch)), strict=True)
         gap, lost, lost_count = np.concatenate(gaps), np.concatenate(losses), sum(counts)
         missing = sum(time[gap] - time[gap - 1])
         self._tell('gap', len(gap), f'{counted(len(gap), "gap")} of {missing:.4g} s in all',
@@ -193,7 +190,7 @@ class Judgement:
         time = self.samples.time
         spreads = [((part.start, part.stop - 1), *np.quantile(
             np.diff(time[part]), (0.05, 0.5, 0.95)).tolist())
-                   for part in stamps.stretches(self._starts, len(time))
+                   for part in stamps.stretches(self._stretch)
                    if part.stop - part.start >= SHORTEST_SEGMENT]
         irregular = [(place, low, high) for place, low, step, high in spreads
                      if high - low > stamps.IRREGULAR_SPREAD * step]
@@ -305,7 +302,7 @@ class Judgement:
 
     def _cut_segments(self) -> None:
         time = self.samples.time
-        parts = list(stamps.stretches(self._starts, len(time)))
+        parts = stamps.stretches(self._stretch)
         short = [part for part in parts if part.stop - part.start < SHORTEST_SEGMENT]
         self.segments = tuple(
             part for part in parts if part.stop - part.start >= SHORTEST_SEGMENT)

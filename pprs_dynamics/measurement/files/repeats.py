@@ -66,18 +66,17 @@ def find_repeat(
 
 def _windows(recording: Recording) -> NDArray[np.uint64]:
     """Return a number for every `WINDOW` samples in a row, (N - WINDOW + 1,); 0 at rest."""
+    from pandas import DataFrame  # takes a third of a second
+    from pandas.util import hash_pandas_object
+
     count = len(recording.time) - WINDOW + 1
     if count < 1:
         return np.zeros(0, dtype=np.uint64)
     # The same bits for NaN of any kind, and for 0 of either sign.
     values = np.concatenate((recording.position, recording.effort), axis=1) + 0.0
     values[np.isnan(values)] = np.nan
-    bits = np.ascontiguousarray(values).view(np.uint64)
+    rows = hash_pandas_object(DataFrame(values), index=False).to_numpy()
     with np.errstate(over='ignore'):
-        rows = np.zeros(len(bits), dtype=np.uint64)
-        for column in bits.T:
-            rows = (rows ^ column) * _MULTIPLIER
-            rows ^= rows >> np.uint64(29)
         found = np.zeros(count, dtype=np.uint64)
         for k in range(WINDOW):
             found = found * _MULTIPLIER + rows[k:k + count]

@@ -9,7 +9,7 @@ already known to be apart. Thresholds are relative to the stretch's own median s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,10 +45,10 @@ STAMP_ROUNDING = 1e-6
 IRREGULAR_SPREAD = 0.5
 
 
-def stretches(starts: Indices, count: int) -> Iterator[slice]:
-    """Yield the stretches between starts as slices."""
-    for first, end in zip(starts, [*starts[1:], count], strict=True):
-        yield slice(int(first), int(end))
+def stretches(numbers: Indices) -> list[slice]:
+    """Return the stretches of samples, which have the same number each, as slices."""
+    edges = [*np.flatnonzero(np.diff(numbers, prepend=-1)).tolist(), len(numbers)]
+    return [slice(first, end) for first, end in pairwise(edges)]
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
@@ -74,18 +74,12 @@ def clock_resets(time: Array) -> Indices:
     return np.array(resets, dtype=np.int64)
 
 
-def late_samples(time: Array, starts: Indices) -> Mask:
+def late_samples(time: Array, numbers: Indices) -> Mask:
     """Return which stamps lie before an earlier sample's of the same stretch."""
     late = np.zeros(len(time), dtype=bool)
-    for part in stretches(starts, len(time)):
+    for part in stretches(numbers):
         late[part] = time[part] < np.maximum.accumulate(time[part])
     return late
-
-
-def sorted_order(time: Array, starts: Indices) -> Indices:
-    """Return the order that sorts each stretch, equal stamps in the order of the file."""
-    return np.concatenate([part.start + np.argsort(time[part], kind='stable')
-                           for part in stretches(starts, len(time))])
 
 
 def duplicates(time: Array) -> Mask:

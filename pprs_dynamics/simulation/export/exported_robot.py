@@ -18,13 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
-from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
-from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
-from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.description import (
     FLOATING,
     Frame,
@@ -45,12 +39,13 @@ SPRINGREF = 'springref'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
 # Of effects on drives: their parameters as a joint's.
-OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
-    ViscousFriction: {'coefficient': DAMPING},
-    CoulombFriction: {'force': FRICTION},
-    DriveInertia: {'mass': ARMATURE},
-    DriveSpring: {'stiffness': STIFFNESS, 'position': SPRINGREF},
+OF_DRIVES = {
+    'viscous_friction': {'coefficient': DAMPING},
+    'coulomb_friction': {'force': FRICTION},
+    'drive_inertia': {'mass': ARMATURE},
+    'drive_spring': {'stiffness': STIFFNESS, 'position': SPRINGREF},
 }
+IN_JOINTS = 'joint_friction', 'joint_spring'
 OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
               'position': SPRINGREF}
 OF_KEYS = {'friction.drives.viscous': DAMPING, 'friction.viscous': DAMPING,
@@ -135,11 +130,11 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Numbers | None]]:
 
 def _of_effect(effect: Effect, passive: Mapping[str, Sequence[str]]) -> Numbers | None:
     """Return the numbers of an effect in drives or passive joints, None where it has others."""
-    if isinstance(effect, DriveEffect) and type(effect) in OF_DRIVES:
-        names = OF_DRIVES[type(effect)]
+    if isinstance(effect, DriveEffect) and effect.name in OF_DRIVES:
+        names = OF_DRIVES[effect.name]
         return {(drive, names[key]): value for drive, values in effect.drives.items()
                 for key, value in values.items()}
-    if not isinstance(effect, (JointFrictionEffect, JointSpring)):
+    if not isinstance(effect, StructureEffect) or effect.name not in IN_JOINTS:
         return None
     numbers: Numbers = {}
     for key, value in effect.values.items():
