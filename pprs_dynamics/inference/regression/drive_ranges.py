@@ -14,7 +14,7 @@ from scipy import fft
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
-from pprs_dynamics.physics.effects.drive_effect import Clearance, DriveRange, Windup
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, Windup
 from pprs_dynamics.physics.effects.laws.elastic_joint import load_by_windup
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -84,6 +84,25 @@ def _delay(recording: FullRate, drive: int) -> float:
     if explained[best] < LEAST_ALIKE * (inner @ inner):
         return 0.0
     return round(float((most - best) * step), 9)  # whatever the clock's origin
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Measurement of a drive by a second encoder that it leads by one of two distances.
+
+    Parameters
+    ----------
+    size : float
+        Between the two [m, rad].
+    of : {'motion', 'load'}
+        Whose side chooses.
+    explained : float
+        Share of the variance of the distance that the two explain.
+    """
+
+    size: float
+    of: str
+    explained: float
 
 
 @dataclass(frozen=True)

@@ -133,25 +133,6 @@ class Windup:
     explained: float
 
 
-@dataclass(frozen=True)
-class Clearance:
-    """Measurement of a drive by a second encoder that it leads by one of two distances.
-
-    Parameters
-    ----------
-    size : float
-        Between the two [m, rad].
-    of : {'motion', 'load'}
-        Whose side chooses.
-    explained : float
-        Share of the variance of the distance that the two explain.
-    """
-
-    size: float
-    of: str
-    explained: float
-
-
 class DriveEffect(CatalogueEffect):
     """An effect that acts in drives, each with its own parameters.
 

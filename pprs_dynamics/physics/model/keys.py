@@ -108,16 +108,14 @@ class Key:
 
     def check(self, value: Any) -> Any:
         """Return the value as a word, a float or a tuple of these, or raise ModelError."""
-        if self.size is None:
-            if not self._allows(value):
-                raise ModelError(self.name, value, self.rule)
-            return value if isinstance(value, str) else float(value)
-        if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
-            raise ModelError(self.name, value, self.rule)
-        has_length = self.size in (ANY, len(value)) or (self.may_be_empty and not len(value))
-        if not has_length or not all(map(self._allows, value)):
-            raise ModelError(self.name, list(value), self.rule)
-        return tuple(value if self.is_text else map(float, value))
+        is_list = hasattr(value, '__len__') and not isinstance(value, (str, bytes, dict))
+        elements = list(value) if is_list else [value]
+        has_length = (self.size in (ANY, len(elements)) or (self.may_be_empty and not elements)
+                      if is_list else self.size is None)
+        if not has_length or not all(map(self._allows, elements)):
+            raise ModelError(self.name, elements if is_list else value, self.rule)
+        found = [element if isinstance(element, str) else float(element) for element in elements]
+        return tuple(found) if is_list else found[0]
 
     def _allows(self, element: Any) -> bool:
         """Return whether a value, or an element of a list, is one."""

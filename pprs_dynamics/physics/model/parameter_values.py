@@ -88,16 +88,14 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
     """Raise ModelError for an uncertainty that is none, or of nothing that an effect has."""
     active = parameters.get('effects.active') or ()
-    for key, value in parameters.items():
-        if not key.startswith(f'{UNCERTAINTIES}.'):
-            continue
-        _, name, *rest = key.split('.')
+    for of, value in below(parameters, f'{UNCERTAINTIES}.').items():
+        key, (name, _, rest) = f'{UNCERTAINTIES}.{of}', of.partition('.')
         if find_effect(name) is None or not rest:
             raise UnknownNameError('key', key, [
                 f'{UNCERTAINTIES}.{effect}' for effect in active])
-        if name in active and f'effects.{name}.{".".join(rest)}' not in parameters:
-            raise ModelError(key, value, f'belong to effects.{name}.{".".join(rest)}, which is '
-                             'not there: take the line out')
+        if name in active and f'effects.{of}' not in parameters:
+            raise ModelError(key, value, f'belong to effects.{of}, which is not there: take the '
+                             'line out')
         Key(key, 'a standard deviation', lower=0).check(value)
 
 
@@ -166,11 +164,8 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
     Numbers of the model have one, in proportion to them; and what is usually small where a file
     says nothing, such as the error of a zero, in its unit.
     """
-    for name, value in parameters.items():
-        target = name.removeprefix('tolerances.')
-        if target == name:
-            continue
-        parameter = find_parameter(target)
+    for target, value in below(parameters, 'tolerances.').items():
+        name, parameter = f'tolerances.{target}', find_parameter(target)
         if not (keys[target].is_number if target in keys else parameter and parameter.expected):
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
