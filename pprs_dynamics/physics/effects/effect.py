@@ -17,7 +17,6 @@ from typing import Any, ClassVar, NamedTuple, Self
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.mechanism.state import MECHANISM, PLATFORM, MechanismState
-from pprs_dynamics.physics.model.keys import Key
 
 
 @dataclass(frozen=True)
@@ -85,8 +84,13 @@ class Parameter:
 
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
-        return float(Key(key, self.description, self.unit, lower=self.lower, upper=self.upper)
-                     .check(value))
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ModelError(key, value, f'be a number ({self.description} [{self.unit}])')
+        # Bounds are finite, so that what lies within is, too.
+        if not self.lower <= value <= self.upper:
+            raise ModelError(key, value, f'be between {self.lower:g} and {self.upper:g} '
+                             f'({self.description} [{self.unit}])')
+        return float(value)
 
 
 class Product(NamedTuple):
