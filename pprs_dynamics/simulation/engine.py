@@ -34,7 +34,7 @@ from pprs_dynamics.simulation.engine_state import (
     add_sites,
     quaternion,
 )
-from pprs_dynamics.simulation.export.exported_robot import MJCF, described, written
+from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot, written
 
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
 COMPILER = {'fusestatic': 'false', 'balanceinertia': 'false', 'boundmass': str(LEAST),
@@ -73,7 +73,7 @@ class MechanismEngine:
         refused = {name: parameters for name, parameters in structure.description.links.items()
                    if reads_urdf and structure.links[name][0] and not _is_body(parameters)}
         if not structure.description.path:
-            spec = mujoco.MjSpec.from_string(written(described('robot', robot), MJCF))
+            spec = mujoco.MjSpec.from_string(written(ExportedRobot(robot), MJCF))
         elif is_mjcf:
             spec = readable_spec(mujoco, str(path))
         else:

@@ -274,7 +274,7 @@ class Judgement:
         missing = np.isnan(values)
         counts = missing.sum(axis=0)
         drives = self._named(counts > 0)
-        share = [f'{name} ({_percent(int(count), len(values))})'
+        share = [f'{name} ({100 * count / len(values):.3g} % of the samples)'
                  for name, count in zip(self.samples.drives, counts, strict=True) if count]
         self._tell(kind, int(counts.sum()), f'no {quantity} of {", ".join(share)}',
                    stamps.runs(np.any(missing, axis=1)), drives)
@@ -319,10 +319,6 @@ class Judgement:
 
     def _named(self, mask: Mask) -> list[str]:
         return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
-
-
-def _percent(count: int, total: int) -> str:
-    return 'all' if count == total else f'{100 * count / total:.3g} % of the samples'
 
 
 def _slow(step: float) -> str:

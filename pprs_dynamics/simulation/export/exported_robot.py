@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,7 +87,7 @@ def export_robot(model: DriveModel, kind: str) -> ExportedRobot:
             left.append(next(key for key in ('gravity', 'robot.gravity') if key in model.values))
         robot = replace(robot, gravity=STANDARD_GRAVITY)
         left += [loop.name for loop in model.robot.structure.loops]
-    return described(ROBOT, robot, taken, tuple(left))
+    return ExportedRobot(robot, taken, tuple(left))
 
 
 def _take(taken: Numbers, numbers: Numbers | None, held: set[str]) -> bool:
@@ -214,22 +215,22 @@ class ExportedRobot:
 
     Parameters
     ----------
-    name : str
     mechanism : Mechanism
     numbers : mapping of (str, str) to float
         By joint and name: `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
         it has them.
-    bodies : tuple of Body
-        Each before what hangs on it, as they stand in MJCF.
     not_expressed : tuple of str
         Keys of the model file and names of effects; of robots with loops in URDF, their loops.
     """
 
-    name: str
     mechanism: Mechanism
-    numbers: Mapping[tuple[str, str], float]
-    bodies: tuple[Body, ...]
-    not_expressed: tuple[str, ...]
+    numbers: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    not_expressed: tuple[str, ...] = ()
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """Bodies, each before what hangs on it, as they stand in MJCF."""
+        return tuple(_bodies(self.mechanism))
 
     def of_joint(self, joint: str) -> dict[str, float]:
         """Return the numbers of a joint by name."""
@@ -243,12 +244,6 @@ class ExportedRobot:
         for name, (row, frame) in structure.links.items():
             if name not in own:
                 yield name, row, frame
-
-
-def described(name: str, mechanism: Mechanism, numbers: Mapping[tuple[str, str], float] = {},
-              not_expressed: tuple[str, ...] = ()) -> ExportedRobot:
-    """Return a mechanism as files of simulators describe it; see `ExportedRobot`."""
-    return ExportedRobot(name, mechanism, numbers, tuple(_bodies(mechanism)), not_expressed)
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -420,7 +415,7 @@ def _rpy(R: Array) -> tuple[float, float, float]:
 
 def _mjcf(robot: ExportedRobot) -> Element:
     structure = robot.mechanism.structure
-    root = Element('mujoco', model=robot.name)
+    root = Element('mujoco', model=ROBOT)
     _add(root, 'compiler', angle='radian', autolimits='true')
     _add(root, 'option', gravity=robot.mechanism.gravity, jacobian='dense',
          integrator='implicitfast')
@@ -487,7 +482,7 @@ def _close(robot: ExportedRobot, elements: Mapping[int, Element], equality: Elem
 
 def _urdf(robot: ExportedRobot) -> Element:
     structure = robot.mechanism.structure
-    root = Element('robot', name=robot.name)
+    root = Element('robot', name=ROBOT)
     base = structure.moved_by[0]
     names = {0: base, **{body.row: body.name for body in robot.bodies}}
     drawn, width = _drawn(robot), THICKNESS * structure.size
