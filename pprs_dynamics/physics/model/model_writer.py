@@ -71,15 +71,13 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
         Where a file cannot be read or written.
     """
     values = moved(values, Path(base or path).absolute().parent, Path(path).absolute().parent)
-    if base is None:
-        text = format_model(values, str(path))
-    else:
+    if base is not None:
         refuse_same_file(path, base)
-        text = edit_model(Path(base).read_text(encoding='utf-8'),
-                          {**kept_parameters(base), **values}, str(path))
-    # What could not be read again is not written.
-    check_size(text.encode('utf-8'), path)
-    parse(text, path)
+        values = {**kept_parameters(base), **values}
+    DriveModel.from_parameters(values, str(path))
+    text = format_model(values) if base is None else edit_model(
+        Path(base).read_text(encoding='utf-8'), values)
+    check_size(text.encode('utf-8'), path)  # what could not be read again is not written
     write_text(path, text)
 
 
@@ -105,21 +103,8 @@ def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
             if key not in keys and key.split('.')[0] not in (*WRITTEN, 'tolerances')}
 
 
-def format_model(values: Mapping[str, Any], path: str = '') -> str:
-    """Return a complete model file, its keys in order and with their units.
-
-    Parameters
-    ----------
-    values : mapping
-    path : str
-        Of the file that it is for; paths in values count from its folder.
-
-    Raises
-    ------
-    ModelError
-        For values that are no model.
-    """
-    DriveModel.from_parameters(values, path)
+def format_model(values: Mapping[str, Any]) -> str:
+    """Return a complete model file, its keys in order and with their units."""
     keys = keys_of(values)
     ordered = {key: values[key] for key in keys if key in values}
     ordered.update((key, value) for key, value in values.items() if key not in ordered
@@ -131,7 +116,7 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
     return text
 
 
-def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
+def edit_model(text: str, values: Mapping[str, Any]) -> str:
     """Return the text of a model file with other values.
 
     Parameters
@@ -141,15 +126,7 @@ def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
     values : mapping
         All flat keys and values that it shall hold; keys that it does not hold and that have
         their default stay out.
-    path : str
-        See `format_model`.
-
-    Raises
-    ------
-    ModelError
-        For values that are no model.
     """
-    DriveModel.from_parameters(values, path)
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
@@ -162,7 +139,7 @@ def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
         pass
     # A file of a form that cannot be edited line by line.
     others = other_nodes(text)
-    return format_model(values, path) + (yaml.safe_dump(others, sort_keys=False) if others else '')
+    return format_model(values) + (yaml.safe_dump(others, sort_keys=False) if others else '')
 
 
 def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
