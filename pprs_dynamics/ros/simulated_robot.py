@@ -212,5 +212,5 @@ def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
                           command_timeout=values['command_timeout'] or np.inf,
                           actuation_delay=values['actuation_delay'])
     return SimulatedRobot(
-        plant, seed=values['seed'], rate=values['rate'], control=control,
+        plant, seed=values['seed'], control=control,
         sensors=SensorSettings(values['encoder_resolution'], values['effort_noise']))

@@ -88,12 +88,13 @@ class Plant(Injecting):
     scale : float
         Multiplies their size.
     rate : float
-        At which it is looked at [Hz]: a whole number of steps lies between.
+        Ticks at which it is looked at [Hz].
 
     Attributes
     ----------
     time, time_step : float
         [s]
+    steps_per_tick : int
     position, velocity : (D,) arrays
         Of the drives [m, rad].
     last_acceleration : (D,) array
@@ -116,7 +117,8 @@ class Plant(Injecting):
 
     def __init__(self, model: DriveModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
-        self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
+        self.steps_per_tick = math.ceil(1 / (rate * LONGEST_STEP))
+        self.time_step = 1 / (rate * self.steps_per_tick)
         self.model = model
         self.engine = MechanismEngine(model)
         self.structure = s = model.robot.structure

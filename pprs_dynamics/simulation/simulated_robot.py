@@ -106,25 +106,19 @@ BANDWIDTH, DAMPING_RATIO = 7.0, 0.9  # of the drives' loops, by default [Hz, 1]
 class SimulatedRobot:
     """A robot to run against; it starts at home and holds.
 
-    Call `command` whenever a command arrives, and `tick` at the rate at which it publishes.
+    Call `command` whenever a command arrives, and `tick` at the rate of the plant.
 
     Parameters
     ----------
     plant : Plant
     seed : int
         Of the noise.
-    rate : float
-        Ticks per second [Hz].
     control, sensors : settings, optional
     """
 
-    def __init__(self, plant: Plant, *, seed: int = 0, rate: float = 500.0,
-                 control: ControlSettings | None = None, sensors: SensorSettings | None = None,
-                 ) -> None:
+    def __init__(self, plant: Plant, *, seed: int = 0, control: ControlSettings | None = None,
+                 sensors: SensorSettings | None = None) -> None:
         self.plant, step = plant, plant.time_step
-        self.steps_per_tick = max(1, round(1 / (rate * step)))
-        if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
-            raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
         self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
                                plant.largest)
         self.control = DriveControl(
@@ -137,7 +131,7 @@ class SimulatedRobot:
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return self._ticks * self.steps_per_tick * self.plant.time_step
+        return self._ticks * self.plant.steps_per_tick * self.plant.time_step
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
         """Put the drives at positions (D,) [m, rad], at rest or with velocities [m/s, rad/s].
@@ -156,13 +150,13 @@ class SimulatedRobot:
     def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
         """Take a command for now, and the next tick's where it is known; False if refused."""
         return self.control.command(
-            self.time, setpoint, following, self.steps_per_tick * self.plant.time_step)
+            self.time, setpoint, following, self.plant.steps_per_tick * self.plant.time_step)
 
     def tick(self) -> Measurement:
         """Return the readings now, and advance to the next tick."""
         now, step, plant = self.time, self.plant.time_step, self.plant
         measured: Measurement | None = None
-        for k in range(self.steps_per_tick):
+        for k in range(plant.steps_per_tick):
             effort = self.control.effort(now + k * step, self.sensors.position,
                                          self.sensors.velocity)
             if measured is None:

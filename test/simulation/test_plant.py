@@ -70,7 +70,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
     forces = model.drive_forces(model.robot.motion_of_drives(
         motion.position, motion.velocity, motion.acceleration)).total
     plant = Plant(model)
-    robot = SimulatedRobot(plant, rate=1 / TICK, control=plant.gains(7.0, 0.9), sensors=QUIET)
+    robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)
     points = [Setpoint(*values) for values in zip(motion.position, motion.velocity, forces,
                                               strict=True)]
     measured = []

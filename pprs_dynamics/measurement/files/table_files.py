@@ -175,7 +175,6 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     joints = drives.joints or drives.names
     named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
              for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
-    _require(table, [*named.values()])
     # What is measured once for all drives.
     shared = {(joint, name): columns.channels.get(name, name) for name in CHANNELS
               if name in columns.channels or name in table.names for joint in joints}
