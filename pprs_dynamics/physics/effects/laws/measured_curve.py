@@ -50,23 +50,15 @@ class Curve(NamedTuple):
     values: tuple[float, ...]
     periodic: bool = False
 
-    @property
-    def intervals(self) -> int:
-        """Between knots."""
-        return len(self.values) - (0 if self.periodic else DEGREE)
-
     def basis(self, x: Array) -> Any:
         """Return the B-splines at values of the variable, (N, len(values)), sparse."""
-        return spline_basis(x, self.start, self.end, self.intervals, self.periodic)
+        intervals = len(self.values) - (0 if self.periodic else DEGREE)
+        return spline_basis(x, self.start, self.end, intervals, self.periodic)
 
     def force(self, x: Array) -> Array:
         """Return the force at values of the variable, (N,) [N, N m]."""
         force: Array = self.basis(x) @ np.asarray(self.values)
         return force
-
-    def outside(self, x: Array) -> np.ndarray:
-        """Return which samples are outside the measured range, (N,) bool."""
-        return ~self.periodic & ((x < self.start) | (x > self.end))
 
 
 def spline_basis(x: Array, start: float, end: float, intervals: int, periodic: bool) -> Any:
@@ -143,8 +135,8 @@ class MeasuredCurve(DriveEffect):
         """Return the sentence that a state is outside the measured range, or None."""
         for drive, curve in self.curves.items():
             x = variable_of(state, drive, curve.variable)
-            outside = curve.outside(x)
-            if np.any(outside):
+            outside = (x < curve.start) | (x > curve.end)
+            if np.any(outside) and not curve.periodic:
                 value = float(x[int(np.argmax(outside))])
                 return (f'{drive}: {curve.variable} {value:.4g} is outside of '
                         f'{curve.start:.4g} to {curve.end:.4g}, where its curve was measured: '
