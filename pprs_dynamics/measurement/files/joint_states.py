@@ -66,7 +66,7 @@ def channel_of(topic: str, kind: str) -> str | None:
 
 
 # Joints, a quantity, a value of each joint, and whether these are commands.
-State = tuple[Sequence[str], str, Sequence[float], bool]
+State = tuple[tuple[str, ...], str, Sequence[float], bool]
 
 
 def states_of(message: Any, kind: str, topic: str = '', joints: Sequence[str] = (),
@@ -82,10 +82,11 @@ def states_of(message: Any, kind: str, topic: str = '', joints: Sequence[str] = 
         value = float(getattr(message, SENSORS[kind][1] if kind in SENSORS else 'data'))
         yield (next((joint for joint in joints if joint in parts), ''),), channel, (value,), False
     elif kind == JOINT_STATE:
+        names = tuple(message.name)
         given = [(channel or quantity, values) for quantity in QUANTITIES
-                 if len(values := getattr(message, quantity)) == len(message.name)]
+                 if len(values := getattr(message, quantity)) == len(names)]
         for quantity, values in given[:1] if channel else given:
-            yield message.name, quantity, values, False
+            yield names, quantity, values, False
     elif kind == DYNAMIC:
         for joint, state in zip(message.joint_names, message.interface_values, strict=False):
             for interface, value in zip(state.interface_names, state.values, strict=False):
@@ -98,4 +99,4 @@ def states_of(message: Any, kind: str, topic: str = '', joints: Sequence[str] = 
                 ('position', measured.positions, False), ('velocity', measured.velocities, False),
                 ('effort', output.effort if is_command else measured.effort, is_command)):
             if len(values) == len(message.joint_names):
-                yield message.joint_names, quantity, values, is_wanted
+                yield tuple(message.joint_names), quantity, values, is_wanted

@@ -147,7 +147,7 @@ class States:
         for names, quantity, values, is_command in states_of(
                 message, kind, topic if channels else '', self.joints):
             if not channels or quantity in CHANNELS:
-                self._rows[EVERY if channels else topic, tuple(names), quantity, is_command].append(
+                self._rows[EVERY if channels else topic, names, quantity, is_command].append(
                     (number, values))
         for field in self.fields:
             if field.topic == topic and not channels:

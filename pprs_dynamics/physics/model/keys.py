@@ -94,7 +94,8 @@ class Key:
     def rule(self) -> str:
         """The requirement on a value, completing "must ..."."""
         if self.choices:
-            return f'be one of {", ".join(self.choices)} ({self.description})'
+            kind = 'one' if self.size is None else 'a list'
+            return f'be {kind} of {", ".join(self.choices)} ({self.description})'
         kind = 'name' if self.is_text else 'finite number'
         form = (f'a {kind}' if self.size is None else f'a list of {kind}s' if self.is_text
                 or self.size == ANY else f'a list of {self.size} {kind}s')

@@ -148,14 +148,12 @@ def _check_place(name: str, values: Mapping[str, Any], effect: type[CatalogueEff
             raise UnknownNameError('drive', drive, robot.drives, f'effects.{name}')
 
 
-def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
-    names = parameters.get('effects.measured', [])
-    if not isinstance(names, (list, tuple)) or not all(
-            isinstance(name, str) and (kind := find_effect(name)) is not None
-            and kind.may_be_measurement for name in names):
-        raise ModelError('effects.measured', names, "be a list of effects that may be a sensor's:"
-                         ' effort_offset')
-    return list(names)
+def _effects_of_sensors(parameters: Mapping[str, Any]) -> Any:
+    if (key := LISTS[1]) not in parameters:
+        return ()
+    known = tuple(name for name, effect in catalogue().items() if effect.may_be_measurement)
+    return Key(key, "effects that may be a sensor's", size=ANY, choices=known).check(
+        parameters[key])
 
 
 def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
