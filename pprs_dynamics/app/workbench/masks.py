@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.app.report.charts import extremes
-from pprs_dynamics.app.workbench.skeleton import Skeleton
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.ticks import SessionError, Ticks
 from pprs_dynamics.app.workbench.view_state import Share, ViewState
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.physics.model.skeleton import Skeleton
 
 Mask = NDArray[np.bool_]
 """Samples and drives that are meant, (M, D)."""

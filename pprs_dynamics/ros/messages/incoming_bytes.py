@@ -18,8 +18,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
-from pprs_dynamics.ros.messages.cdr import HEADER, STAMP, Walk
 from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.system.cdr import HEADER, STAMP, Walk
 
 TWO_WORDS = 8
 

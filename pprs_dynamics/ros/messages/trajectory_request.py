@@ -19,10 +19,10 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import FEWEST_POSES, PlatformMotion, spline_derivatives
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.ros.messages.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk, aligned
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, RobotNames, nanoseconds
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk, aligned
 
 TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
 REJECT, SPLINE = 'reject', 'spline'

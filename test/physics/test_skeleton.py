@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.app.workbench.skeleton import Skeleton
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.skeleton import Skeleton
 
 
 def lengths(drawn: Skeleton, are_drives: bool) -> dict[str, np.ndarray]:
