@@ -95,7 +95,7 @@ class MotionLimits:
         """Return the use of range, speed and acceleration of every drive, (N, D) each."""
         middle, reach = room(model)
         usual = np.inf if model.moves_joints else SLIDE_SPEED
-        fastest = np.minimum(model.speed_limits, self.velocity or usual)
+        fastest = np.minimum(model.robot.structure.speed, self.velocity or usual)
         return {name: np.abs(values) / ((1 - self.margin) * bound) for name, values, bound in (
             ('range', position - middle, np.maximum(reach, 1e-12)),
             ('velocity', velocity, fastest), ('acceleration', acceleration, self.acceleration))}

@@ -464,7 +464,7 @@ class Search:
             return 0.0
         motion = read_motion(excerpt.motion, reading)
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
-            np.isfinite(self.strokes[0]), self.model.speed_limits, np.inf)
+            np.isfinite(self.strokes[0]), self.model.robot.structure.speed, np.inf)
         most = float(np.max(np.maximum(self._reach(reading), speed)))
         used = np.ptp(motion.position, axis=0) / (self.strokes[1] - self.strokes[0])
         used = used[np.isfinite(used) & (used > 0)]

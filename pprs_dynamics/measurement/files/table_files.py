@@ -73,8 +73,12 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     columns = drives.columns or RecordedColumns()
     files = files_of(path, columns.files) if columns.files else {'position': path}
     joints, shared = drives.joints or drives.names, None
+    named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
+             for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
+    likely = [column for column in (columns.time, columns.time_fraction, *named.values(),
+                                    *columns.channels.values()) if isinstance(column, str)]
     if 'time' in files:
-        table = _opened(files.pop('time'), columns)
+        table = open_table(files.pop('time'), columns.decimal, likely)
         own: Column = columns.time if columns.time is not None else next(
             (name for name in TIME_COLUMNS if name in table.names), 1)
         _require(table, [own])
@@ -83,14 +87,12 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     arrays: dict[tuple[str, str], Array] = {}
     told: list[Defect] = []
     for quantity, file in sorted(files.items(), key=lambda item: item[0] != 'position'):
-        table = _opened(file, columns)
+        table = open_table(file, columns.decimal, likely)
         time = None if shared is not None else _time_column(table, columns)
         if columns.files:
-            chosen = {(joint, quantity): columns.drives[drive].names[quantity]
-                      for joint, drive in zip(joints, drives.names, strict=True)
-                      if quantity in columns.drives[drive].names}
+            chosen = {key: column for key, column in named.items() if key[1] == quantity}
         else:
-            chosen, prefix = _chosen(table, drives, columns, topic)
+            chosen, prefix = _chosen(table, joints, named, columns.channels, topic)
         if not chosen:
             continue
         stamped = [] if time is None else [time, columns.time_fraction or time]
@@ -133,13 +135,6 @@ def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Ta
     return open_arrays(path) or CsvTable.open(path, decimal, likely)
 
 
-def _opened(path: Path, columns: RecordedColumns) -> Table:
-    named = [columns.time_fraction, *columns.channels.values(),
-             *(column for of in columns.drives.values() for column in of.names.values())]
-    return open_table(path, columns.decimal,
-                      [column for column in (columns.time, *named) if isinstance(column, str)])
-
-
 def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
     position = path / columns.files.get('position', '')
     kind = ('LeRobot' if path.is_dir() and not columns.files else
@@ -169,15 +164,13 @@ def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
         + init_command(table.path.name[:40]))
 
 
-def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
+def _chosen(table: Table, joints: tuple[str, ...], named: Mapping[tuple[str, str], Column],
+            channels: Mapping[str, Column], topic: str | None,
             ) -> tuple[dict[tuple[str, str], Column], str]:
     """Return the column of each joint and quantity, and the prefix of those of our own format."""
-    joints = drives.joints or drives.names
-    named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
-             for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
     # What is measured once for all drives.
-    shared = {(joint, name): columns.channels.get(name, name) for name in CHANNELS
-              if name in columns.channels or name in table.names for joint in joints}
+    shared = {(joint, name): channels.get(name, name) for name in CHANNELS
+              if name in channels or name in table.names for joint in joints}
     found: dict[str, dict[tuple[str, str], Column]] = {'': {}}
     for name in table.names:
         joint, slash, quantity = name.rpartition('/')

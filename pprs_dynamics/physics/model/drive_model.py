@@ -185,11 +185,6 @@ class DriveModel:
         return ratios
 
     @property
-    def speed_limits(self) -> Array:
-        """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
-        return self.robot.structure.speed
-
-    @property
     def faults(self) -> tuple[str, ...]:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
         return () if self.values.get('links.inertia') else self.robot.structure.description.faults
