@@ -151,3 +151,22 @@ class RecordedDrives:
     units: tuple[DriveUnits, ...] = ()
     effort_limits: tuple[float, ...] = ()
     effort_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'joints', self.joints or self.names)
+
+    @property
+    def layout(self) -> RecordedColumns:
+        """Layout of tables, that of this package where none is given."""
+        return self.columns or RecordedColumns()
+
+    def columns_of(self, drive: str) -> DriveColumns:
+        """Return the columns of a drive, none where none are given."""
+        return self.layout.drives.get(drive, DriveColumns())
+
+    @property
+    def named(self) -> dict[tuple[str, str], Column]:
+        """Columns that are given, by joint and quantity."""
+        return {(joint, quantity): column
+                for joint, drive in zip(self.joints, self.names, strict=True)
+                for quantity, column in self.columns_of(drive).names.items()}

@@ -13,7 +13,7 @@ from pprs_dynamics.app.api.inputs import read_checked
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared, write_json
 from pprs_dynamics.app.report.figures import recording_page
 from pprs_dynamics.app.report.terminal import console, escape, shown, staged_bar, text_table
-from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.inference.readings.findings import effort_looks_like, lines_of
 from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
@@ -124,11 +124,9 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
 def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
     """Return how the columns of a recording are read: column, drive, quantity, unit, range."""
     rows = []
-    joints = recorded.joints or recorded.names
-    for drive, joint, units in zip(recorded.names, joints, recorded.units, strict=True):
+    for drive, joint, units in zip(recorded.names, recorded.joints, recorded.units, strict=True):
         found = summary.drives[drive]
-        columns = (DriveColumns() if recorded.columns is None
-                   else recorded.columns.drives.get(drive, DriveColumns()))
+        columns = recorded.columns_of(drive)
         current = 'current' in columns.names
         in_amperes = any(finding.kind == 'no_gain' and drive in finding.drives
                          for finding in summary.findings)

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveColumns, RecordedColumns
+from pprs_dynamics.drives import DriveColumns
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
@@ -223,7 +223,7 @@ def velocity_factors(excerpt: Excerpt) -> dict[int, float]:
 
 def _as_read(model: DriveModel, drive: str) -> DriveColumns:
     """Return the columns and scales with which a model file reads a drive."""
-    return (model.recorded.columns or RecordedColumns()).drives.get(drive, DriveColumns())
+    return model.recorded.columns_of(drive)
 
 
 def position_scales(model: DriveModel, part: Reading, whole: Reading) -> Scales:
@@ -241,7 +241,7 @@ def position_scales(model: DriveModel, part: Reading, whole: Reading) -> Scales:
 
 def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> tuple[Scales, str]:
     """Return the columns with which drives are read in another order, or a line of joints."""
-    drives, joints = model.drives, model.recorded.joints or model.drives
+    drives, joints = model.drives, model.recorded.joints
     moved = [(keys, places) for keys, places in (
         (('position', 'velocity'), reading.positions), (('effort', 'current'), reading.efforts))
         if np.any(places != np.arange(len(drives)))]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import CHANNELS, DriveColumns, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, optional_library
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag
 from pprs_dynamics.measurement.files.joint_states import (
@@ -62,7 +62,7 @@ def read_bag(
     MissingLibraryError
         Where rosbags is not installed.
     """
-    joints = recorded.joints or recorded.names
+    joints = recorded.joints
     with opened_bag(path) as (bag, findings):
         fields = fields_of(bag, recorded)
         of_fields = {field.topic for field in fields}
@@ -144,27 +144,23 @@ def _samples(path: Path, recorded: RecordedDrives, states: States,
     epoch = whole_epoch(stamps / 1e9)
     return Samples.of_columns(
         joints, (stamps[kept] - epoch * 10**9) / 1e9,
-        {key: values[kept] for key, values in _of_drives(columns, joints, recorded).items()},
+        {key: values[kept] for key, values in _of_drives(columns, recorded).items()},
         f'bag, {topics}', tuple(findings), epoch)
 
 
-def _of_drives(columns: Mapping[Key, Array], joints: tuple[str, ...], recorded: RecordedDrives,
-               ) -> dict[Key, Array]:
+def _of_drives(columns: Mapping[Key, Array], recorded: RecordedDrives) -> dict[Key, Array]:
     """Return the columns of drives: what is measured for all, and other joints' that are named.
 
     `columns` of a model file name these as <joint>/<quantity>.
     """
-    named = {} if recorded.columns is None else recorded.columns.drives
     found = {**{(joint, quantity): values for (of, quantity), values in columns.items()
-                if not of for joint in joints}, **columns}
-    for joint, drive in zip(joints, recorded.names, strict=True):
-        for quantity, column in named.get(drive, DriveColumns()).names.items():
-            of, _, other = str(column).rpartition('/')
-            if other == quantity and (of, other) in columns:
-                found[joint, quantity] = columns[of, other]
-        if (joint, 'effort') in found:
-            found.pop((joint, CURRENT), None)
-    return found
+                if not of for joint in recorded.joints}, **columns}
+    for (joint, quantity), column in recorded.named.items():
+        of, _, other = str(column).rpartition('/')
+        if other == quantity and (of, other) in columns:
+            found[joint, quantity] = columns[of, other]
+    return {(joint, quantity): values for (joint, quantity), values in found.items()
+            if quantity != CURRENT or (joint, 'effort') not in found}
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],

@@ -52,24 +52,21 @@ def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
     Of std_msgs' arrays `/topic[2]` is enough.
     """
     topics = sorted({c.topic for c in bag.connections}, key=len, reverse=True)
-    columns = recorded.columns.drives if recorded.columns is not None else {}
-    shared = recorded.columns.channels if recorded.columns is not None else {}
+    shared = {(joint, quantity): column for joint in recorded.joints
+              for quantity, column in recorded.layout.channels.items()}
     found = []
-    for joint, drive in zip(recorded.joints or recorded.names, recorded.names, strict=True):
-        own = columns[drive].names if drive in columns else {}
-        for quantity, column in {**shared, **own}.items():
-            name = str(column)
-            if not name.startswith('/'):
-                continue
-            topic = next((known for known in topics if name.startswith(known)
-                          and name[len(known):][:1] in ('.', '[')), None)
-            if topic is None:
-                raise UnreadableFileError(
-                    bag.path, f'no topic of the column {name}; it contains '
-                    + ', '.join(sorted(topics)[:MOST]))
-            way = name[len(topic):]
-            found.append(Field(topic, f'data{way}' if way.startswith('[') else way[1:], joint,
-                               quantity))
+    for (joint, quantity), column in {**shared, **recorded.named}.items():
+        name = str(column)
+        if not name.startswith('/'):
+            continue
+        topic = next((known for known in topics if name.startswith(known)
+                      and name[len(known):][:1] in ('.', '[')), None)
+        if topic is None:
+            raise UnreadableFileError(bag.path, f'no topic of the column {name}; it contains '
+                                      + ', '.join(sorted(topics)[:MOST]))
+        way = name[len(topic):]
+        found.append(Field(topic, f'data{way}' if way.startswith('[') else way[1:], joint,
+                           quantity))
     return found
 
 

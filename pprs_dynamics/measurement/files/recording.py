@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, as_numbers
-from pprs_dynamics.drives import CHANNELS, DRIVES, DriveColumns, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, DRIVES, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, write_bag
 from pprs_dynamics.measurement.files.bag_storage import is_bag
@@ -218,7 +218,7 @@ def read_recording(
     if not isinstance(drives, RecordedDrives):
         drives = RecordedDrives(tuple(drives))
     with readable(path):
-        read = (read_bag if is_bag(path) and not (drives.columns and drives.columns.files)
+        read = (read_bag if is_bag(path) and not drives.layout.files
                 else read_table)
         samples = read(path, drives, topic, progress)
     samples, applied = _as_efforts(path, _scaled(samples, drives), drives)
@@ -234,8 +234,7 @@ def read_recording(
 
 def _scaled(samples: Samples, drives: RecordedDrives) -> Samples:
     """Return samples in SI units, as the columns of a model file say."""
-    given = {} if drives.columns is None else drives.columns.drives
-    of_drives = [given.get(drive, DriveColumns()) for drive in drives.names]
+    of_drives = [drives.columns_of(drive) for drive in drives.names]
     velocity, effort = samples.velocity, samples.effort.copy()
     scale, offset, speed, force = np.array([
         (names.position_scale, names.position_offset, names.velocity_scale, names.effort_scale)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, Column, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, suggestion
 from pprs_dynamics.measurement.files.array_files import KINDS, ArrayTable, open_arrays
 from pprs_dynamics.measurement.files.csv_files import CsvTable
@@ -70,11 +70,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     MissingLibraryError
         For Parquet without pyarrow.
     """
-    columns = drives.columns or RecordedColumns()
+    columns, joints, named, shared = drives.layout, drives.joints, drives.named, None
     files = files_of(path, columns.files) if columns.files else {'position': path}
-    joints, shared = drives.joints or drives.names, None
-    named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
-             for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
     likely = [column for column in (columns.time, columns.time_fraction, *named.values(),
                                     *columns.channels.values()) if isinstance(column, str)]
     if 'time' in files:
