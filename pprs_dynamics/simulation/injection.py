@@ -836,17 +836,17 @@ def guides(model: DriveModel) -> set[str]:
     """Return the drives whose friction follows the load across them."""
     following = {name for effect in model.effects if isinstance(effect, ModelJointFriction)
                  for name in effect.blocks if name in model.drives}
-    return following | {drive for drive, mu in zip(model.drives, np.broadcast_to(
-        model.friction.coefficient, len(model.drives)), strict=True) if mu}
+    return following | {drive for drive, mu in zip(
+        model.drives, model.friction.coefficient, strict=True) if mu}
 
 
 def own_joint_friction(model: DriveModel) -> JointFriction:
     """Return the friction of all joints, driven or not, that the model file has."""
     friction = model.friction
-    rows = np.broadcast_arrays(friction.viscous, friction.coulomb, friction.coefficient,
-                               np.zeros(len(model.drives)))[:3]
-    of_drives = {drive: dict(zip(('viscous', 'torque', 'coulomb'), numbers, strict=True))
-                 for drive, *numbers in zip(model.drives, *rows, strict=True)}
+    of_drives = {drive: {'viscous': viscous, 'torque': torque, 'coulomb': coulomb}
+                 for drive, viscous, torque, coulomb in zip(
+                     model.drives, friction.viscous, friction.coulomb, friction.coefficient,
+                     strict=True)}
     return JointFriction(*map(np.concatenate, zip(*(
         model.robot.tree_friction(blocks, model.reversal) for blocks in (of_drives, *(
             effect.blocks for effect in model.effects if isinstance(effect, ModelJointFriction)))),

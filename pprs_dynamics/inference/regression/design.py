@@ -579,7 +579,7 @@ class Design:
             width = float(self.model.reversal.widths(len(self.drives))[drive])
             turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
             rubbing = (friction.dry(recording.friction_load)[:, drive] * turned
-                       - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
+                       - friction.viscous[drive] * q_dot)
         return np.stack((q, q_ddot, rubbing))
 
     def _misread(self, effect: MeasurementEffect, recording: FullRate,

@@ -252,7 +252,7 @@ def own_total(design: Design, drive: int, of: str) -> float:
     friction = design.given.friction
     whole = {VISCOUS_FRICTION: friction.viscous, LOAD_FRICTION: friction.coefficient}
     if of in whole:
-        return float(np.broadcast_to(whole[of], len(design.drives))[drive])
+        return float(whole[of][drive])
     usual = np.zeros(len(design.drives))
     if 'load' in design.residuals.variables:
         usual = np.median(np.abs(design.residuals.variables['load']), axis=0)

@@ -216,8 +216,8 @@ class DriveModel:
     @property
     def offset(self) -> Array:
         """The constant efforts of its drives, (D,) [N m, N]."""
-        return sum((np.asarray(effect.value) for effect in self.effects
-                    if isinstance(effect, DriveOffset)), np.zeros(len(self.drives)))
+        return sum((effect.value for effect in self.effects if isinstance(effect, DriveOffset)),
+                   np.zeros(len(self.drives)))
 
     @property
     def title(self) -> str:
@@ -368,7 +368,7 @@ class DriveModel:
         parts = {RIGID_BODY: efforts[rows.RIGID]}
         for effect in self.effects:
             if isinstance(effect, DriveOffset):
-                parts[effect.name] = np.asarray(effect.value) + np.zeros_like(efforts[rows.TOTAL])
+                parts[effect.name] = effect.value + np.zeros_like(efforts[rows.TOTAL])
             elif isinstance(effect, OWN):
                 parts[effect.name] = efforts[
                     rows.DRIVE_FRICTION if isinstance(effect, DriveFriction) else rows.JOINT_EFFORT]
