@@ -33,7 +33,7 @@ class ControlSettings:
 
     Parameters
     ----------
-    stiffness, damping : float or (D,) sequence
+    stiffness, damping : float or (D,) array
         Gains of position [N/m] and velocity [N s/m]. The defaults give about 7 Hz and a damping
         ratio of 0.9 for the 1.5 to 2 kg that a drive of the paper's robot moves. An unknown
         force of 1 N then costs a quarter of a millimetre, as on a real machine of this size.
@@ -45,8 +45,8 @@ class ControlSettings:
         From the electronics' effort to the drive's [s].
     """
 
-    stiffness: float | tuple[float, ...] = 4000.0
-    damping: float | tuple[float, ...] = 150.0
+    stiffness: float | Array = 4000.0
+    damping: float | Array = 150.0
     gravity_compensation: bool = False
     command_timeout: float = 0.1
     actuation_delay: float = 0.0
@@ -106,8 +106,6 @@ class DriveControl:
         self.settings, self._limits, self._weight = settings, limits, weight
         self._smoothing = smoothing
         count = len(limits.drives)
-        self._stiffness, self._damping = (np.broadcast_to(np.asarray(gain, dtype=float), count)
-                                          for gain in (settings.stiffness, settings.damping))
         self._delay_line: deque[Array] = deque(
             maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
@@ -179,8 +177,8 @@ class DriveControl:
         if setpoint.position is not None and setpoint.velocity is not None:
             goal, speed = self._interpolated(setpoint.position, setpoint.velocity, age)
             speed = self._as_late(speed, velocity)
-            wanted = (wanted + self._compensation + self._stiffness * (goal - position)
-                      + self._damping * (speed - velocity))
+            wanted = (wanted + self._compensation + self.settings.stiffness * (goal - position)
+                      + self.settings.damping * (speed - velocity))
         else:
             self._wanted_speed = None
         self._delay_line.append(self._limited(now, wanted))

@@ -204,8 +204,8 @@ class Plant(Injecting):
     def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
         """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""
         rate = 2 * np.pi * frequency
-        return ControlSettings(tuple(rate ** 2 * self.inertia),
-                               tuple(2 * damping * rate * self.inertia), **settings)
+        return ControlSettings(rate ** 2 * self.inertia, 2 * damping * rate * self.inertia,
+                               **settings)
 
     def holding(self, position: Array) -> Array:
         """Return the efforts that hold the model's weight at positions of the drives (D,).

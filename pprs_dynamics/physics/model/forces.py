@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,7 @@ class Forces:
         return state.position, state.velocity, state.acceleration
 
 
+@dataclass(eq=False)
 class ModelState:
     """Memory of effects between calls; made by `initial_state` of a model.
 
@@ -80,9 +81,6 @@ class ModelState:
         By effect.
     start : float, optional
         When the motion began [s]; None before its first sample.
-
-    Attributes
-    ----------
     end : float, optional
         Time of the last sample [s].
     closed : dict of Structure to (C,) array
@@ -90,10 +88,10 @@ class ModelState:
         where the next one is near. No result depends on them.
     """
 
-    def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
-        self.memories, self.start = memories, start
-        self.end: float | None = None
-        self.closed: dict[Any, Array] = {}
+    memories: dict[str, Any]
+    start: float | None = None
+    end: float | None = None
+    closed: dict[Any, Array] = field(default_factory=dict)
 
     def advance(self, time: Array | None, fresh: Callable[[], ModelState]) -> None:
         """Take note of the times (N,) of the next samples, the first of which is the start.
@@ -128,10 +126,7 @@ class ModelState:
             except Exception as error:  # another package's effect may keep anything
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
-        state = ModelState(copied, self.start)
-        state.end = self.end
-        state.closed = dict(self.closed)
-        return state
+        return replace(self, memories=copied, closed=dict(self.closed))
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,9 +109,8 @@ def _of_model(model: DriveModel) -> Iterator[tuple[str, Numbers | None]]:
     values, loops = model.values, {loop.name for loop in model.robot.structure.loops}
     for key, number in OF_KEYS.items():
         if key in values:
-            numbers = np.broadcast_to(np.asarray(values[key], dtype=float), len(model.drives))
             yield key, {(drive, number): value for drive, value in zip(
-                model.drives, numbers.tolist(), strict=True)}
+                model.drives, values[key], strict=True)}
     if viscous := values.get('friction.revolute.viscous'):
         yield 'friction.revolute.viscous', {(name, DAMPING): viscous for name in HINGES}
     for key in ('friction.offset', 'friction.drives.coulomb', *(
