@@ -234,7 +234,7 @@ class Answer:
 
     # Residual
 
-    @outside_cost('a residual above hypot(1.5 noise, form error), or 5 times the noise: `unknown`')
+    @outside_cost('a residual above hypot(1.5 noise, form error): `unknown`')
     def _above_noise(self) -> dict[str, float]:
         """Return the drives with more residual than noise and forms explain, over the noise.
 
@@ -248,8 +248,7 @@ class Answer:
         for d in self.fits.regression.drives:
             floor = max(self.noise_levels[self.drives[d]], 1e-300)
             form = self.decisions.most_form_share * root_mean_square(forms[:, d]) / floor
-            allowed = min(float(np.hypot(self.decisions.left_ratio, form)),
-                          self.decisions.most_left)
+            allowed = float(np.hypot(self.decisions.left_ratio, form))
             # A constant may be slow noise.
             ratio = float(np.nanstd(residual[:, d])) / floor
             effort = float(np.nanstd(self.given.measured[:, d]))

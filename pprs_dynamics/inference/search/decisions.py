@@ -56,9 +56,6 @@ class Decisions:
     # Residual of a drive over its noise, above which the verdict is unknown unless form errors
     # explain it. A reader sees a residual of 1.5 times the noise in a plot.
     left_ratio: float = 1.5
-    # Residual of a drive over its noise, above which the verdict is unknown. No form of an effect
-    # is off by so much.
-    most_left: float = 5.0
     # How near a set must come to the best to be listed as its rival [deviance]. Odds of 150 to 1.
     rival_margin: float = 10.0
     # How nearly an effect must pay to be listed as a suspect [deviance]. Odds of 12 to 1 against
