@@ -217,7 +217,7 @@ def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(
 
 
 def test_an_effect_whose_memory_cannot_be_copied_is_told(package: Any, tmp_path: Path) -> None:
-    package.WornBrake.drive_memory = classmethod(lambda cls: {'samples': 0, 'log': (x for x in ())})
+    package.WornBrake.drive_memory = staticmethod(lambda *_: {'log': (x for x in ())})
     model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
     with pytest.raises(EffectError, match='effect worn_brake: its memory cannot be copied'):
         model.initial_state().copy()

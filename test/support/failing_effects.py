@@ -71,7 +71,7 @@ class WornBrake(DriveEffect):
             f"columns_{drive.memory['samples']}", last)
 
     @classmethod
-    def drive_memory(cls):
+    def drive_memory(cls, start=None):
         return fault('drive_memory', {'samples': 0})
 
 class Hose(BodyEffect):

@@ -107,10 +107,7 @@ class FullRate:
         """Return the columns of an effect, (k, N), as if the drive had one direction if given."""
         found = []
         for part in self.segments:
-            memory = effect.drive_memory()
-            if memory is not None:
-                effect.begin(memory, self.start)
-            samples = self.samples(part, drive, memory)
+            samples = self.samples(part, drive, effect.drive_memory(self.start))
             if direction is not None:
                 samples = replace(samples, direction=np.full_like(samples.velocity, direction))
             found.append(np.stack(effect.columns(samples, **shape)))

@@ -191,26 +191,22 @@ class DriveEffect(CatalogueEffect):
         return np.stack([np.stack(cls.columns(drive, **shape))[scanned] for shape in shapes])
 
     @classmethod
-    def drive_memory(cls) -> Any:
-        """Return a fresh memory of one drive, or None for an effect without one."""
-        return None
+    def drive_memory(cls, start: float | None = None) -> Any:
+        """Return a fresh memory of one drive, or None for an effect without one.
 
-    @classmethod
-    def begin(cls, memory: Any, time: float) -> None:
-        """Set the start time of the recording [s] in a fresh memory of one drive; default: nothing.
-
-        The first samples that are evaluated may be later, since derivatives need a window.
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s]; the first samples that are evaluated may be later, since
+            derivatives need a window.
         """
+        return None
 
     def initial_memory(self, start: float | None = None) -> Any:
         """Return a fresh memory per drive, or None for an effect without one."""
         if self.drive_memory() is None:
             return None
-        memory = {drive: self.drive_memory() for drive in self.drives}
-        if start is not None:
-            for of_drive in memory.values():
-                self.begin(of_drive, start)
-        return memory
+        return {drive: self.drive_memory(start) for drive in self.drives}
 
     def continued_memory(self, fresh: Any, before: Any) -> Any:
         """Return the memories of drives that were there before, and fresh ones of others."""

@@ -100,7 +100,7 @@ class EffortFilter(MeasurementEffect):
         return (lagged - cls.sense(effort, drive, **shape),)
 
     @classmethod
-    def drive_memory(cls) -> Any:
+    def drive_memory(cls, start: float | None = None) -> Any:
         """Return the last time, and what goes into each lag and comes out of it last."""
         return {'time': None, 'states': None}
 

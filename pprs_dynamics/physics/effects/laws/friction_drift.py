@@ -90,14 +90,9 @@ class FrictionDrift(DriveEffect):
         return [{'time': float(tau)} for tau in np.geomspace(longest / 20, longest, 6)]
 
     @classmethod
-    def drive_memory(cls) -> Any:
+    def drive_memory(cls, start: float | None = None) -> Any:
         """Return the time of the start, None before it is known, and of no work since."""
-        return {'start': None, 'last': None, 'work': 0.0}
-
-    @classmethod
-    def begin(cls, memory: Any, time: float) -> None:
-        """Start the clock."""
-        memory['start'] = time
+        return {'start': start, 'last': None, 'work': 0.0}
 
 
 def _worked(time: Array, speed: Array, tau: float, memory: Any) -> Array:

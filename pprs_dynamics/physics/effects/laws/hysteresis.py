@@ -79,7 +79,7 @@ class Hysteresis(DriveEffect):
         return [{'distance': float(x_d)} for x_d in np.geomspace(shortest, longest, 12)]
 
     @classmethod
-    def drive_memory(cls) -> Any:
+    def drive_memory(cls, start: float | None = None) -> Any:
         """Return the last position, None before the first, and where the drive last reversed."""
         return {'position': None, 'side': 0.0, 'q_r': 0.0, 'z_r': 0.0}
 

@@ -73,7 +73,7 @@ class TimeDelay(MeasurementEffect):
         return [{'delay': d} for d in sorted(delays)]
 
     @classmethod
-    def drive_memory(cls) -> Any:
+    def drive_memory(cls, start: float | None = None) -> Any:
         """Return the past: times and efforts that are not yet measured."""
         return {'time': np.zeros(0), 'effort': np.zeros(0)}
 
