@@ -82,14 +82,6 @@ def late_samples(time: Array, numbers: Indices) -> Mask:
     return late
 
 
-def duplicates(time: Array) -> Mask:
-    """Return which stamps equal the one before, within sorted stretches.
-
-    Where the clock was set back two stamps side by side differ by definition.
-    """
-    return np.concatenate(([False], np.diff(time) == 0))
-
-
 def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     """Return the steps of a stretch that are gaps, those with lost samples, and how many lost.
 

@@ -60,9 +60,7 @@ class CoupledDrives(StructureEffect):
 
         A place is a motor with its turns per turn of each drive.
         """
-        return cls.at_places(tuple(
-            (name, ratios) for name, ratios in robot.motors.items()
-            if np.count_nonzero(ratios) > 1))
+        return cls.at_places(tuple(robot.motors.items()))
 
     @classmethod
     def of_place(cls, place: Any, is_alike: bool, moved: float) -> OfPlace:
