@@ -11,6 +11,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 from made_once import diagnose
+from random_states import smooth_motion
 from shared_cases import shared_case
 from single_axis import axis_motion
 
@@ -30,34 +31,28 @@ MODEL = DriveModel.load('config/single_axis.yaml')
 OWN = 'links.mass', 'friction.viscous', 'friction.coulomb'
 MASS, VISCOUS, COULOMB = (MODEL.values[key][0] for key in OWN)
 TIME = np.arange(0, 8.0, 0.005)
+MOVED = axis_motion(TIME)
 
 
 def recorded(effort: Array) -> Recording:
-    random = np.random.default_rng(5)
-    return Recording.from_arrays('run', TIME, axis_motion(TIME).position, None,
-                                 effort + random.normal(0, 1.0, effort.shape), ('axis',))
-
-
-TAKEN: list[tuple[str, tuple[str, ...], Array]] = [
-    ('drive_inertia', ('mass',), np.array([-MASS])),
-    ('viscous_friction', ('coefficient',), np.array([-VISCOUS])),
-    ('coulomb_friction', ('force',), np.array([-COULOMB]))]
+    noise = np.random.default_rng(5).normal(0, 1.0, effort.shape)
+    return Recording.from_arrays('run', TIME, MOVED.position, None, effort + noise, ('axis',))
 
 
 @pytest.mark.parametrize('share', [0.8, 1.2])
-@pytest.mark.parametrize(('name', 'names', 'own'), TAKEN)
-def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], own: Array,
+@pytest.mark.parametrize(('name', 'key', 'own', 'column'), [
+    ('drive_inertia', 'mass', -MASS, MOVED.acceleration),
+    ('viscous_friction', 'coefficient', -VISCOUS, MOVED.velocity),
+    ('coulomb_friction', 'force', -COULOMB, np.sign(MOVED.velocity))])
+def test_no_more_is_taken_away_than_there_is(name: str, key: str, own: float, column: Array,
                                              share: float) -> None:
     """What would leave less than nothing is held at nothing, at a cost."""
-    moved = axis_motion(TIME)
-    columns = {'drive_inertia': moved.acceleration, 'viscous_friction': moved.velocity,
-               'coulomb_friction': np.sign(moved.velocity)}[name]
-    recording = recorded(MODEL.drive_forces(moved).total + share * own * columns)
+    recording = recorded(MODEL.drive_forces(MOVED).total + share * own * column)
     # The model's own numbers are known, so that what is missing is the effect's alone.
     exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
         (f'tolerances.{key}' for key in OWN), 1e-6)})
     fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
-    component = Component.of(catalogue()[name], 0, {}, names)
+    component = Component.of(catalogue()[name], 0, {}, (key,))
     found = fits.evaluate((EffectCandidate.of([component]),))
     taken = found.coefficients(component)
     if share < 1:
@@ -70,12 +65,23 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
         assert fits.refused(found) == [component]
 
 
+def test_no_more_is_taken_off_rods_than_they_weigh() -> None:
+    paper = DriveModel.load('config/paper.yaml')
+    light = DriveModel.from_parameters({**paper.values, 'masses.rods': [0.1] * 3})
+    heavy, less = (model.drive_forces(smooth_motion(TIME)) for model in (paper, light))
+    effort = heavy.total + 4 * (less.total - heavy.total)  # as of rods of -0.2 kg
+    fits = FittedSets(Design.of(paper, [Recording.from_arrays(
+        'run', TIME, heavy.mechanism.position, None, effort, paper.drives)]), DECISIONS)
+    component = Component.of(paper.bound(catalogue()['link_mass']), None, {}, ('rods.mass',))
+    found = fits.evaluate((EffectCandidate.of([component]),))
+    assert found.coefficients(component) == pytest.approx([-0.19])
+
+
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     """One direction may have less than nothing by chance; the other is told all the same."""
     bare = DriveModel.from_parameters({**MODEL.values, 'friction.coulomb': [0.0]})
-    moved = axis_motion(TIME)
-    forward = (1 + np.sign(moved.velocity)) / 2
-    effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
+    forward = (1 + np.sign(MOVED.velocity)) / 2
+    effort = bare.drive_forces(MOVED).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
     fits = FittedSets(Design.of(bare, [recorded(effort)]), DECISIONS)
     both = Component.of(catalogue()['asymmetric_friction'], 0, {},
                         ('force_forward', 'force_backward'))
@@ -89,24 +95,21 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
 
 def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
     """Amplitudes a thousand times the error could cancel within the stroke to any curve."""
-    moved = axis_motion(TIME)
-    curve = 60 * moved.position + 2e4 * moved.position ** 3
-    fits = FittedSets(Design.of(MODEL, [recorded(MODEL.drive_forces(moved).total + curve)]),
+    curve = 60 * MOVED.position + 2e4 * MOVED.position ** 3
+    fits = FittedSets(Design.of(MODEL, [recorded(MODEL.drive_forces(MOVED).total + curve)]),
                       DECISIONS)
-    error = root_mean_square(fits.design.residuals.error)
     ripple, spring = catalogue()['force_ripple'], catalogue()['drive_spring']
 
     def wave(pitch: float) -> Component:
         return Component.of(ripple, 0, {'pitch': pitch}, ripple.variants[-1])
-    long = fits.evaluate((EffectCandidate.of([wave(50 * np.ptp(moved.position))]),))
-    assert np.abs(long.coefficients(*long.blocks)).max() < 20 * error
-    straight = fits.evaluate((EffectCandidate.of([Component.of(spring, 0, {},
-                                                               spring.variants[0])]),))
+    bent, line = wave(50 * np.ptp(MOVED.position)), Component.of(spring, 0, {}, spring.variants[0])
+    long, straight = (fits.evaluate((EffectCandidate.of([part]),)) for part in (bent, line))
+    size = root_mean_square(fits.design.residuals.error)
+    assert np.abs(long.coefficients(*long.blocks)).max() < 20 * size
     assert straight.cost < long.cost
     # Of waves that come back the prior is the one of every other effect.
-    short = wave(np.ptp(moved.position) / 10)
-    rows = fits.components.term(short).rows[0]
-    usual = fits.regression.block({0: rows}).precision
+    short = wave(np.ptp(MOVED.position) / 10)
+    usual = fits.regression.block(fits.components.term(short).rows).precision
     assert np.linalg.slogdet(fits.components.block(short).precision)[1] == pytest.approx(
         np.linalg.slogdet(usual)[1], abs=1.0)
 
@@ -114,7 +117,7 @@ def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
 def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     """Mass and friction that all are too small explain as well what a gain of 1.9 would."""
     loose = DriveModel.from_parameters({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
-    doubled = recorded(1.9 * MODEL.drive_forces(axis_motion(TIME)).total)
+    doubled = recorded(1.9 * MODEL.drive_forces(MOVED).total)
     found = diagnose(loose, [doubled])
     assert found.effects
     assert not [effect for effect in found.effects if effect.name == 'effort_gain']
@@ -144,15 +147,14 @@ def test_a_late_effort_is_found_without_an_impossible_gain() -> None:
 
 
 def test_a_gain_that_a_drive_may_have_is_one() -> None:
-    found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(axis_motion(TIME)).total)])
+    found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(MOVED).total)])
     assert [effect.name for effect in found.effects] == ['effort_gain']
     assert found.effects[0].parameters['axis.gain'].value == pytest.approx(0.2, abs=0.02)
 
 
 def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path) -> None:
     """Radians that are called degrees: next to no motion, which linear forces are far from."""
-    real = arm.real_arm(tmp_path)
-    run = arm.record(real, arm.motion(8.0, seed=0), 0.2, 0)
+    run = arm.record(arm.real_arm(tmp_path), arm.motion(8.0, seed=0), 0.2, 0)
     radians = np.array([np.pi / 180, np.pi / 180, 1.0])
     found = diagnose(DriveModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
         'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)

@@ -214,9 +214,13 @@ class Constraints:
             turns = units_of(self.design.given, component.drive).turns
             kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,
                                                    *component.effect.linear)}
-            self._bounds[component] = np.array(
-                [(kinds[name].lower, kinds[name].upper) for name in component.names],
-            ).T - _given(component)
+            bounds = np.array([(kinds[name].lower, kinds[name].upper)
+                               for name in component.names]).T
+            if issubclass(component.effect, AddedBody) and not component.effect.bodies():
+                robot, (place,) = self.design.given.robot, component.effect.places
+                rows = [robot.structure.links[link][0] for link in place.links or (place.link,)]
+                bounds[0] = np.maximum(bounds[0], -(1 - KEPT) * robot.by_joint[rows, 0].min())
+            self._bounds[component] = bounds - _given(component)
         return self._bounds[component]
 
     def own(self, drive: int, of: str) -> float:
