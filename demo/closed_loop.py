@@ -282,10 +282,9 @@ def _tracking(commands: np.ndarray, states: np.ndarray, late_share: float) -> Tr
     times, measured, _, _ = _columns(states[inside])
     robot, rest = DriveModel.load().robot, np.zeros_like(measured)
     wanted = CubicHermiteSpline(sent, positions, velocities)(times)
-    goal, found = (robot.motion_of_drives(q, rest, rest) for q in (wanted, measured))
-    turn = (Rotation.from_quat(goal.orientation).inv()
-            * Rotation.from_quat(found.orientation)).magnitude()
-    return Tracking(times - sent[0] - LEAD_IN, found.position - goal.position, turn, late_share,
+    goal, found = (robot.at(q, rest, rest).frame_of('platform') for q in (wanted, measured))
+    turn = (Rotation.from_matrix(goal.R).inv() * Rotation.from_matrix(found.R)).magnitude()
+    return Tracking(times - sent[0] - LEAD_IN, found.p - goal.p, turn, late_share,
                     commands, states)
 
 

@@ -26,11 +26,12 @@ import made_up_arm
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.mechanism.motion import spline_derivatives
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.mechanism.state import PLATFORM
 
@@ -87,12 +88,14 @@ def block(effect: type[CatalogueEffect], drive: str) -> dict[str, Any]:
 
 
 @cache
-def platform() -> tuple[DriveModel, PlatformMotion]:
+def platform() -> tuple[DriveModel, JointMotion]:
     """Return the paper's robot and a motion of it."""
     time = np.arange(0, SECONDS, 1 / RATE)
     warming = {'temperature': np.tile(20 + time, (6, 1)).T}  # a kelvin a second
-    return (DriveModel.load(),
-            Excitation(SECONDS, seed=3).motion(time).with_channels(warming))
+    model = DriveModel.load()
+    state = model.mechanism(Excitation(SECONDS, seed=3).motion(time))
+    return model, JointMotion(state.position, state.velocity, state.acceleration, time,
+                              channels=warming)
 
 
 def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
@@ -106,8 +109,7 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
         # Positions are read with the error, so that the model is evaluated at another pose.
         q = (state.position + changed.position_error(state.position)
              + changed.loaded_position_error(state.transmitted))
-        poses = model.robot.motion_of_drives(q, 0 * q, 0 * q)
-        at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
+        at = JointMotion(q, *spline_derivatives(motion.time, q, is_pose=False), motion.time)
     forces = changed.drive_forces(at)
     added = changed.measured(forces).total - plain.total
     if changed.position_effects:

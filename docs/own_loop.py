@@ -27,11 +27,11 @@ def one_sample(model: DriveModel, t: float) -> JointMotion | PlatformMotion:
 
     In a loop of your own these are your trajectory's next setpoint.
     """
-    shape = (1, len(model.drives) if model.moves_joints else 3)
+    shape = (1, 3 if model.robot.plans_poses else len(model.drives))
     q, v, a = (np.full(shape, SWING * value) for value in (
         np.sin(TURN * t), TURN * np.cos(TURN * t), -TURN**2 * np.sin(TURN * t)))
     stamp = np.array([t])  # what effects with a memory count from
-    if model.moves_joints:
+    if not model.robot.plans_poses:
         structure = model.robot.structure
         home = structure.home[structure.tables.drives]
         return JointMotion(home + q, v, a, time=stamp)

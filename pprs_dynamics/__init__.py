@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from pprs_dynamics.app.workbench.session import Session
     from pprs_dynamics.arrays import Array
     from pprs_dynamics.errors import (
-        ConvergenceError,
         EffectError,
         LimitError,
         MissingLibraryError,
@@ -58,7 +57,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.forces import Forces, ModelState
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'Array', 'CatalogueEffect',
-           'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
+           'ComparisonResult', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
            'FitResult', 'Forces', 'HelicalPath', 'JointMotion', 'LimitError',
            'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
@@ -79,7 +78,7 @@ _HOMES = {
     'app.workbench.session': ('Session',),
     'arrays': ('Array',),
     'errors': (
-        'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
+        'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
         'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
         'WorkspaceError'),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),

@@ -199,8 +199,8 @@ class MotionError(PprsError, ValueError):
         super().__init__(f'{quantity}: {found}, must {rule}')
 
 
-class PoseError(PprsError):
-    """A pose for which there is no answer.
+class WorkspaceError(PprsError, ValueError):
+    """A pose that the mechanism cannot reach, or may not by its limits.
 
     Parameters
     ----------
@@ -217,16 +217,8 @@ class PoseError(PprsError):
         super().__init__(f'sample {sample}: {found}; {rule}')
 
 
-class WorkspaceError(PoseError, ValueError):
-    """A pose that the mechanism cannot reach, or may not by its limits; see `PoseError`."""
-
-
 class SingularityError(WorkspaceError, ArithmeticError):
     """A pose at which drive forces are not defined, or closer to it than allowed."""
-
-
-class ConvergenceError(PoseError, ArithmeticError):
-    """Forward kinematics found no pose of the right assembly mode; see `PoseError`."""
 
 
 class LimitError(PprsError, ValueError):

@@ -29,7 +29,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from benchmarks.cell.cell import TOPICS, Cell, Efforts, States, cell, configured
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -58,7 +58,7 @@ def at_start(names: tuple[str, ...] = DRIVES) -> dict[str, float]:
 def gravity_of(position: Array) -> Array:
     """Return what holds the drives at rest at positions (6,), which need not be on the path."""
     model, rest = DriveModel.load(), np.zeros((1, len(DRIVES)))
-    motion = model.robot.motion_of_drives(position[None], rest, rest)
+    motion = JointMotion(position[None], rest, rest)
     return np.asarray(model.drive_forces(motion).total[0])
 
 

@@ -15,7 +15,6 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import HOME
-from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 PERIODS = (5.0, 8.0, 10.0, 20.0)  # [s]
 SINES = 8  # per degree of freedom
@@ -130,10 +129,11 @@ def _is_allowed(model: DriveModel, motion: PlatformMotion) -> bool:
         model.limits.check_strokes(mechanism.position)
     except PprsError:
         return False
-    condition = condition_number(model.robot.geometry, mechanism.links.J).max()
+    robot, links = model.robot, mechanism.links
+    condition = robot.condition_number(robot.jacobian(links)).max()
     return bool(np.abs(mechanism.velocity).max() < FASTEST
                 and np.abs(mechanism.acceleration).max() < STRONGEST
-                and np.abs(mechanism.links.sin_u).min() > ROD_SINE and condition < CONDITION)
+                and np.abs(np.sin(robot.rods(links)[0])).min() > ROD_SINE and condition < CONDITION)
 
 
 def joint_motion(duration: float = 30.0, rate: float = 100.0, seed: int = 0) -> JointMotion:

@@ -198,8 +198,8 @@ class Scene:
         _, rate, burst = differentiator.differentiated(run.beside)
         velocity[inside] += rate
         acceleration[inside] += burst
-        found = self.model.robot.motion_of_drives(run.position, velocity, acceleration)
-        return self.model.drive_forces(found.with_time(motion.time)).total
+        return self.model.drive_forces(JointMotion(
+            run.position, velocity, acceleration, motion.time)).total
 
     def recording(self, name: str, effects: Sequence[Choice], noise: np.ndarray,
                   off: Sequence[np.random.Generator] = ()) -> Recording:

@@ -48,7 +48,7 @@ def record_motion(seed: int) -> Residuals:
     forces = DriveModel.load().drive_forces(motion)
     state = forces.mechanism
     rotation = Rotation.from_quat(motion.orientation).as_matrix()
-    rod_angle = state.links.rod_angle
+    rod_angle = state.robot.rods(state.links)[0]
     variables = {
         'position': state.position, 'velocity': state.velocity,
         'acceleration': state.acceleration, 'load': state.friction_load,

@@ -30,7 +30,7 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.three_pprs.closed_form import NO_LOAD, _is_regular, read_parameters
+from pprs_dynamics.physics.three_pprs.closed_form import _is_regular, read_parameters
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -98,7 +98,7 @@ def batches(
     found = _rounds({
         'model, with friction': lambda: model.drive_forces(PlatformMotion(*arrays)),
         **{peer.name: lambda peer=peer: peer.many(PlatformMotion(*arrays)) for peer in peers},
-        'forward kinematics': lambda: model.robot.motion_of_drives(q, 0 * q, 0 * q),
+        'forward kinematics': lambda: model.robot.at(q, 0 * q, 0 * q),
     }, rounds)
     _print(f'batches of {BATCH}, per sample', found, 1e6 / BATCH)
     found = _rounds({'one core': on_one, 'two cores': on_threads}, rounds, time.perf_counter)
@@ -215,8 +215,8 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     """Print the floating-point operations of one sample."""
     _Counted.counts.clear()
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    parameters = _counted(read_parameters(model._own_parameters))
-    _is_regular(parameters, 0, table, NO_LOAD, _CountedTable())
+    parameters = _counted(read_parameters(model._own_parameters[0]))
+    _is_regular(parameters, 0, table, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

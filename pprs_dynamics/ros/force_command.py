@@ -330,7 +330,7 @@ class Feedforward:
             Where the robot cannot be there, or there is no such force.
         """
         rest = np.zeros((1, len(position)))
-        motion = self._model.robot.motion_of_drives(position[None], rest, rest).held()
+        motion = JointMotion(position[None], rest, rest).held()
         return self._at_rest(TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64)), gravity)
 
     def hold(self, gravity: bool, left: int = 0) -> ForceCommand:
@@ -386,7 +386,7 @@ class Feedforward:
         now = (int(last.request.offsets[-1]) - left) / NANOSECONDS
         path = _path_of(last).stop(now, duration)
         lower, upper = self._limits.lower, self._limits.upper
-        motion = self._model.robot.motion_of_drives(
+        motion = JointMotion(
             np.clip(path.position, lower, upper), path.velocity, path.acceleration)
         forces = self._model.sound_at(motion).drive_forces(motion)
         assert path.time is not None  # `stop` gives it

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.residuals.live import ERROR_SPAN, MECHANISM_WINDOW, WINDOW, Compared
+from pprs_dynamics.inference.residuals.live import ERROR_SPAN, GEAR_WINDOW, WINDOW, Compared
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_described
 from pprs_dynamics.ros.diagnosis_worker import ADOPTED, DiagnosisWorker, StreamWindows
@@ -128,7 +128,7 @@ class MonitorNode(ManagedNode):
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         arguments = arguments_of(options)
         self._worker = DiagnosisWorker()
-        parameters = (with_changed(PARAMETERS, 'window', default=MECHANISM_WINDOW)
+        parameters = (with_changed(PARAMETERS, 'window', default=GEAR_WINDOW)
                       if is_described(overrides(self)) else PARAMETERS)
         self._settings = ModelParameters(self, arguments, parameters, self._use)
         node_values = self._settings.node_values

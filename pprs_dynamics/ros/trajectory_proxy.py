@@ -234,17 +234,11 @@ class TrajectoryProxyNode(Node):
         if missing == SPLINE:
             _end_at_rest(goal)
         names = RobotNames.of(model)
-        if not (model.moves_joints or goal.trajectory.points):
+        if model.robot.plans_poses and not goal.trajectory.points:
             return readers_for(model, names)[TRAJECTORY].of_message(
                 goal.multi_dof_trajectory, now, missing)
-        request = RequestReader(JointTrajectory, names.joints).of_message(
+        return RequestReader(JointTrajectory, names.joints).of_message(
             goal.trajectory, now, missing)
-        if model.moves_joints:
-            return request
-        # Drives' positions: the platform's motion follows from them.
-        drives: Any = request.motion
-        motion = model.robot.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
-        return TrajectoryRequest(motion.with_time(drives.time), request.start, request.offsets)
 
 
 def _duration(goal: Any, now: int) -> float:

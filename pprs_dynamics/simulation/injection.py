@@ -549,7 +549,7 @@ def _joint_friction(run: Injection) -> Injected:
     closed = run.engine.closed(run.motion)
 
     def rows_of(name: str) -> Array:
-        return run.engine.friction(run.model.robot.tree_friction(
+        return run.engine.friction(run.model.robot.friction_table(
             {name: {}}, run.model.reversal), closed, run.plain.carried).rows
 
     def speed_of(rows: Array) -> Array:
@@ -848,7 +848,7 @@ def own_joint_friction(model: DriveModel) -> JointFriction:
                      model.drives, friction.viscous, friction.coulomb, friction.coefficient,
                      strict=True)}
     return JointFriction(*map(np.concatenate, zip(*(
-        model.robot.tree_friction(blocks, model.reversal) for blocks in (of_drives, *(
+        model.robot.friction_table(blocks, model.reversal) for blocks in (of_drives, *(
             effect.blocks for effect in model.effects if isinstance(effect, ModelJointFriction)))),
         strict=True)))
 

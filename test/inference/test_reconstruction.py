@@ -14,7 +14,7 @@ from model_recordings import with_effects
 from numpy.testing import assert_allclose, assert_array_equal
 from random_states import inverse_kinematics, paper_model
 
-from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.errors import MotionError, WorkspaceError
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
@@ -86,8 +86,8 @@ def test_drives_that_cannot_close_are_named_with_sample_and_time():
     real = truth()
     q = real.drives.position.copy()
     q[2000:] += np.linspace(0, 1, len(q) - 2000)[:, None] * [1, 0, 0, 0, 0, 0]
-    with pytest.raises(ConvergenceError, match=r'at \d\.\d+ s no pose') as caught:
-        reconstruct(MODEL, recording_of(real, position=encoder(q)))
+    with pytest.raises(WorkspaceError, match=r'at \d\.\d+ s the loops do not close') as caught:
+        treated_forces(MODEL, reconstruct(MODEL, recording_of(real, position=encoder(q))))
     assert 2000 < caught.value.sample < len(q)
 
 

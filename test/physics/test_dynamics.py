@@ -48,6 +48,11 @@ def loads_of_joints(robot, forces):
         robot.by_joint, robot.gravity_row)
 
 
+def rod_cosines(robot, motion):
+    """Return cos u_i of all rods, (N, 3)."""
+    return np.cos(robot.rods(states.model_of(robot).mechanism(motion).links)[0])
+
+
 def reactions_on_platform(robot, forces):
     """Return the force of every rod on the platform, (N, 3, 3) [N]."""
     return loads_of_joints(robot, forces).F
@@ -57,14 +62,15 @@ def reactions_on_platform(robot, forces):
 
 def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = states.model_of(robot).drive_forces(motion)
-    chains, body = forces.mechanism.links, forces.mechanism.reactions
+    body = forces.mechanism
+    u, u_dot, u_ddot = robot.rods(body.links)
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
         robot.geometry.rod_length  # noqa: E741
     slides, lifts, rods = robot.masses[:-1].reshape(3, 3, 1)
-    c, s = chains.cos_u[..., None], chains.sin_u[..., None]
-    u_dot, u_ddot = chains.u_dot[..., None], chains.u_ddot[..., None]
+    c, s = np.cos(u)[..., None], np.sin(u)[..., None]
+    moment_of_rod, u_dot, u_ddot = u_ddot, u_dot[..., None], u_ddot[..., None]
     along, swing = -c * e + s * UP, s * e + c * UP
-    q_ddot = chains.acceleration
+    q_ddot = body.acceleration
     a_slide = q_ddot[:, :3, None] * n
     a_lift = a_slide + q_ddot[:, 3:, None] * UP
     a_rod = a_lift + l / 2 * (u_ddot * swing - u_dot ** 2 * along)
@@ -73,30 +79,28 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     at_C = rods * (a_rod - g) - at_A  # from the lift on the rod
     moment = np.sum(n * np.cross(l / 2 * along, at_A - at_C), axis=-1)
     transverse = rods[:, 0] * l ** 2 / 12
-    assert_allclose(moment, transverse * chains.u_ddot, rtol=0, atol=ROUNDING)
+    assert_allclose(moment, transverse * moment_of_rod, rtol=0, atol=ROUNDING)
     from_slide = at_C + lifts * (a_lift - g)
     from_base = from_slide + slides * (a_slide - g)
 
     # A drive pushes along its guide; the rest of the force is the guide's load.
-    assert_allclose(body.efforts[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
-    assert_allclose(body.efforts[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
+    assert_allclose(body.rigid_force[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
+    assert_allclose(body.rigid_force[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
     across_slide = from_base - np.sum(from_base * n, axis=-1, keepdims=True) * n
-    assert_allclose(body.guide_load[:, :3], np.linalg.norm(across_slide, axis=-1), rtol=0,
+    assert_allclose(body.friction_load[:, :3], np.linalg.norm(across_slide, axis=-1), rtol=0,
                     atol=ROUNDING)
-    assert_allclose(body.guide_load[:, 3:], np.linalg.norm(from_slide[..., :2], axis=-1),
+    assert_allclose(body.friction_load[:, 3:], np.linalg.norm(from_slide[..., :2], axis=-1),
                     rtol=0, atol=ROUNDING)
 
 
-def test_a_state_with_one_drive_that_accelerates_more_is_that_of_such_a_motion(robot, motion):
+def test_inertia_is_the_change_of_forces_by_the_acceleration_of_a_drive(robot, motion):
     model = states.model_of(robot, NUMBERS)
     state = model.mechanism(motion)
-    changed = state.accelerated(2, 0.7)
-    expected = state.acceleration + 0.7 * (np.arange(6) == 2)
-    assert_allclose(model.mechanism(changed.motion).acceleration, expected, atol=1e-7)
-    forces = model.drive_forces(changed.motion)
-    assert_allclose(changed.rigid_force, forces.parts['rigid_body'], atol=ROUNDING)
-    rubbing = next(effect for effect in model.effects if effect.name == 'passive_friction')
-    assert_allclose(rubbing.force(changed), forces.parts['passive_friction'], atol=ROUNDING)
+    change = np.einsum('nij,j->ni', robot.jacobian(state.links), 0.7 * (np.arange(6) == 2))
+    forces = model.drive_forces(PlatformMotion.from_rows(np.hstack((
+        motion.rows[:, :13], motion.rows[:, 13:] + change))))
+    assert_allclose(state.rigid_force + 0.7 * robot.inertia(state)[2], forces.parts['rigid_body'],
+                    atol=ROUNDING)
 
 
 # Friction in the joints ----------------------------------------------------------------------
@@ -120,7 +124,7 @@ def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
     _, n = chain_vectors(robot.geometry)
     loads = loads_of_joints(robot, forces)
     at_C = loads.f[:, [robot.structure.rows[f'hinge_{i}'] for i in (1, 2, 3)]]
-    rod = forces.mechanism.links.u_dot[..., None] * n
+    rod = robot.rods(forces.mechanism.links)[1][..., None] * n
     relative = rod - motion.angular_velocity[:, None]
     moments = []
     for velocity, load, c, mu, d in (
@@ -149,7 +153,7 @@ def test_passive_friction_does_the_joints_virtual_work_for_every_drive(robot, mo
             lambda x, p=pose: drive_motion(robot.geometry, moved(p, x))[0][0], 6)
         platform = np.linalg.inv(turns)
         u = central_difference(
-            lambda x, p=pose: model.mechanism(moved(p, x)).links.rod_angle[0], 6) @ platform
+            lambda x, p=pose: robot.rods(model.mechanism(moved(p, x)).links)[0, 0], 6) @ platform
         virtual = np.zeros(6)
         for i in range(3):
             rod = n[i][:, None] * u[i]
@@ -163,7 +167,7 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
     zero = np.zeros_like(motion.position)
     starting = PlatformMotion(motion.position, motion.orientation, zero, zero,
                               motion.linear_acceleration, motion.angular_acceleration)
-    cos_u = states.model_of(robot).mechanism(starting).links.cos_u
+    cos_u = rod_cosines(robot, starting)
     starting = starting[np.all(np.abs(cos_u) > 0.06, axis=1)]
     forces = states.model_of(robot, changes).drive_forces(starting)
     for part in ('active_friction', 'passive_friction'):
@@ -175,13 +179,13 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
 
 
 def test_independent_chains_do_each_chains_virtual_work(robot, motion):
-    cos_u = states.model_of(robot).mechanism(motion).links.cos_u
+    cos_u = rod_cosines(robot, motion)
     defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
     changes = {**INDEPENDENT, **HARD_SIGN, **NUMBERS}
     forces = states.model_of(robot, changes).drive_forces(defined)
     at_C, at_A, *_ = joint_friction(robot, defined, forces, *NUMBERS.values())
     _, n = chain_vectors(robot.geometry)
-    lever = robot.geometry.rod_length * forces.mechanism.links.cos_u
+    lever = robot.geometry.rod_length * rod_cosines(robot, defined)
     slides = at_A[..., 2] / lever
     lifts = np.sum((at_A + at_C) * n, axis=-1) / lever
     assert_allclose(forces.parts['passive_friction'], np.concatenate((slides, lifts), axis=1),
@@ -238,8 +242,8 @@ def test_state_of_another_model_is_refused(remembering):
 
 
 @pytest.mark.parametrize(('file', 'motion', 'rule'), [
-    ('config/paper.yaml', JointMotion(*np.zeros((3, 4, 6))), 'must be a PlatformMotion for'),
-    ('config/paper.yaml', None, 'must be a PlatformMotion for'),
+    ('config/paper.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 6\)'),
+    ('config/paper.yaml', None, 'must be a JointMotion or a PlatformMotion for'),
     ('config/single_axis.yaml', HelicalPath().motion(np.arange(4.0)), 'must be a JointMotion for'),
     ('config/single_axis.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 1\)'),
     ('config/delta.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 3\)')])

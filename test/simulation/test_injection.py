@@ -187,7 +187,7 @@ def paper_run() -> PlainRobot:
 def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, file: str) -> None:
     """The engine's joints rub under loads with friction: 1 % of usual noise remains at most."""
     model = DriveModel.load(f'config/{file}.yaml')
-    if model.moves_joints:
+    if not model.robot.plans_poses:
         motion: Any = draw_motion(model, 6.0, 3)
         plain = PlainRobot(model, motion, rounds=4)
     else:

@@ -16,7 +16,7 @@ import pytest
 import robots_with_loops as robots
 
 import pprs_dynamics
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.simulation.drive_control import (
     LONGEST_LATE,
@@ -56,7 +56,7 @@ def test_the_model_needs_the_efforts_under_which_the_plant_accelerates(
     # Loads of friction are those of the acceleration before: they settle.
     for _ in range(5):
         plant.last_acceleration = plant.acceleration(q, v, effort, v, 0.0)
-    needed = model.drive_forces(model.robot.motion_of_drives(
+    needed = model.drive_forces(JointMotion(
         q[None], v[None], plant.last_acceleration[None])).total[0]
     assert needed == pytest.approx(effort, abs=1e-5 * plant.largest.max())
 
@@ -67,7 +67,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
 ) -> None:
     model = models(tmp_path)[name]
     motion = draw_motion(model, 8.0, 1, 1 / TICK)[:500]
-    forces = model.drive_forces(model.robot.motion_of_drives(
+    forces = model.drive_forces(JointMotion(
         motion.position, motion.velocity, motion.acceleration)).total
     plant = Plant(model)
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)

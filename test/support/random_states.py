@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.physics.mechanism import evaluation
 from pprs_dynamics.physics.mechanism.description import about_centre
-from pprs_dynamics.physics.three_pprs.robot import ClosedForm, Geometry, Masses, ThreePprs
+from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, ThreePprs
 
 ELBOWS = ('up', 'down')
 REACH, TURN = 0.1, 0.2  # of the sampled workspace around home [m, rad]
@@ -57,9 +57,14 @@ def random_masses(rng: np.random.Generator) -> Masses:
         tuple(rng.uniform(-0.05, 0.05, 3)), tuple(float(element) for element in inertia))
 
 
-def inverse_kinematics(geometry: Geometry, motion: PlatformMotion) -> ClosedForm:
-    """Return the motion of chains and drives that belongs to a platform motion."""
-    return ClosedForm(ThreePprs.of(geometry, random_masses(np.random.default_rng(0))), motion)
+def inverse_kinematics(geometry: Geometry, motion: PlatformMotion) -> JointMotion:
+    """Return the motion of the drives that belongs to a platform motion."""
+    return any_robot(geometry).drive_motion(motion)[0]
+
+
+def any_robot(geometry: Geometry) -> ThreePprs:
+    """Return a robot of a geometry."""
+    return ThreePprs.of(geometry, random_masses(np.random.default_rng(0)))
 
 
 def masses_of(robot: ThreePprs) -> Masses:

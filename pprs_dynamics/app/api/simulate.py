@@ -140,7 +140,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     share_done = stage(progress, 'simulating')
     # With one seed the effects are the same on every path.
     drives = nominal = None
-    if found.moves_joints:
+    if not found.robot.plans_poses:
         nominal = draw_motion(found, duration, 0) if path_seed else None
     else:
         if path_seed or motion is not None:

@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = DriveModel.load(options.model)
-    if model.is_mechanism:
+    if model.has_bodies:
         for line in mechanism_lines(model):
             screen.print(shown(line))
         description = model.robot.structure.description
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
         screen.print(f'page: {shown(options.report)}', soft_wrap=True)
     if options.json:
         write_json(options.json, InfoJson(
-            robot=describe_mechanism(model) if model.is_mechanism else None,
+            robot=describe_mechanism(model) if model.has_bodies else None,
             recordings=summaries,
             effort_looks_like=effort_looks_like(summary.findings for summary in summaries)))
     return 0

@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
                         tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)
     model = first.model
-    for line in mechanism_lines(model) if model.moves_joints else ():
+    for line in mechanism_lines(model):
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')

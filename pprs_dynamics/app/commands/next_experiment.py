@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     screen, result = answer(next_experiment, options, purpose=options.purpose, seed=options.seed)
     show(result, options, screen)
     result.save(options.output)
-    if result.inputs.model.moves_joints:
+    if not result.inputs.model.robot.plans_poses:
         screen.print('[bold]Play it[/] with a controller of joint trajectories: positions, '
                      f'velocities and accelerations are in {shown(options.output)}')
     else:

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
 def _motion(options: argparse.Namespace, model: DriveModel) -> PlatformMotion | None:
     if options.path == 'excitation':
         return None
-    if model.moves_joints:
+    if not model.robot.plans_poses:
         raise UsageError(f'--path is {displayed(options.path)}, must be excitation for '
                          f'{model.title}: only a 3-PPRS follows poses of its platform')
     if options.path != 'helix':

@@ -107,7 +107,7 @@ def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = N
         What explains most of the squared error.
     """
     is_fitted = bool(reference_files(model.values, model.source))
-    if not model.moves_joints or is_fitted:
+    if not model.has_links or is_fitted:
         if worst is not None and worst.kind == 'friction':
             return ('Find out which effect explains this error by friction',
                     files.command('diagnose', '--report', 'why.html'))
@@ -118,7 +118,7 @@ def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = N
 
 
 def _has_no_friction(model: DriveModel) -> bool:
-    return model.moves_joints and not reference_files(model.values, model.source) and not any(
+    return model.has_links and not reference_files(model.values, model.source) and not any(
         np.any(model.values[key]) for key in OWN_FRICTION)
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSerie
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
-from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
 SLIDE_SPEED = 0.5  # [m/s], of the 3-PPRS, whose file has no limit of speed
@@ -88,13 +87,14 @@ class MotionLimits:
         found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
                  for d, drive in enumerate(model.drives)}
         return {name: float(share.max()) for name, share in (
-            found if model.moves_joints else {**found, **self._of_platform(model, state)}).items()}
+            {**found, **self._of_platform(model, state)} if model.robot.plans_poses else found
+        ).items()}
 
     def _of_drives(self, model: DriveModel, position: Array, velocity: Array,
                    acceleration: Array) -> dict[str, Array]:
         """Return the use of range, speed and acceleration of every drive, (N, D) each."""
         middle, reach = room(model)
-        usual = np.inf if model.moves_joints else SLIDE_SPEED
+        usual = SLIDE_SPEED if model.robot.plans_poses else np.inf
         fastest = np.minimum(model.robot.structure.speed, self.velocity or usual)
         return {name: np.abs(values) / ((1 - self.margin) * bound) for name, values, bound in (
             ('range', position - middle, np.maximum(reach, 1e-12)),
@@ -103,16 +103,17 @@ class MotionLimits:
     def _of_platform(self, model: DriveModel, state: Any) -> dict[str, Array]:
         """Return the use of what limits the 3-PPRS alone, (N,) each."""
         robot: Any = model.robot
-        bounds, left, chains = robot.bounds, 1 - self.margin, state.links
-        angles = {'rod angle of chain': (1 - np.abs(chains.sin_u)) / (left * (1 - bounds.rod_sine))}
+        bounds, left, (u, *_) = robot.bounds, 1 - self.margin, robot.rods(state.links)
+        angles = {'rod angle of chain': (1 - np.abs(np.sin(u))) / (left * (1 - bounds.rod_sine))}
         if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
-            angles['cosine of rod angle'] = (1 - np.abs(chains.cos_u)) / (
+            angles['cosine of rod angle'] = (1 - np.abs(np.cos(u))) / (
                 left * (1 - bounds.rod_cosine))
         return {
             **{f'{name} {k + 1}': share[:, k] for name, share in angles.items() for k in range(3)},
-            'tilt of the platform': state.motion.tilt / (left * self.tilt),
-            'condition number': condition_number(robot.geometry, chains.J) / (
+            'tilt of the platform': robot.variables(state)['platform_tilt'] / (left * self.tilt),
+            'condition number': robot.condition_number(robot.jacobian(state.links)) / (
                 left * min(bounds.condition_number, self.condition_number))}
+
 
 class NoMotionError(PprsError, ValueError):
     """The robot has no room for a motion within its limits."""
@@ -120,7 +121,7 @@ class NoMotionError(PprsError, ValueError):
 
 def room(model: DriveModel) -> tuple[Array, Array]:
     """Return the middle of the drives' motion and the way to either side, (D,) each."""
-    if model.moves_joints:
+    if not model.robot.plans_poses:
         middle, reach = model.robot.structure.room(WIDEST)
         return middle, reach
     lower, upper = model.limits.lower, model.limits.upper
@@ -168,13 +169,13 @@ class Motions:
 
     def sampled(self, series: JointSeries, time: Array) -> PlatformMotion | JointMotion:
         """Return the motion of a series at times [s]: of the 3-PPRS that of its platform."""
-        moved, robot = series.motion(time), self.model.robot
-        return moved if self.model.moves_joints else robot.motion_of_drives(
-            moved.position, moved.velocity, moved.acceleration).with_time(time)
+        moved, robot = series.motion(time), cast(Any, self.model.robot)
+        return moved if not robot.plans_poses else robot.platform_motion(robot.at(
+            moved.position, moved.velocity, moved.acceleration)).with_time(time)
 
     def forces(self, series: JointSeries, time: Array) -> Forces:
         """Return the model's forces along a series at times [s]."""
-        return self.model.drive_forces(self.sampled(series, time))
+        return self.model.drive_forces(series.motion(time))
 
     def uses(self, series: JointSeries, time: Array | None = None) -> dict[str, float]:
         """Return the use of each limit, its margin taken off; by default at the full rate."""

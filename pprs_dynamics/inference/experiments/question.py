@@ -413,7 +413,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
         What is there already; may be none: then noise is a share of each drive's largest effort.
     motions : Motions
     """
-    if not (model.moves_joints or model_numbers(model)):
+    if not (model.has_links or model_numbers(model)):
         model = DriveModel.from_parameters({**model.values, **{
             f'tolerances.{key}': TOLERANCE for key in NUMBERS if np.any(model.values[key])}})
     groups = [(term,) for term in _common_terms(model)]

@@ -95,7 +95,7 @@ def fit_base(model: DriveModel, recordings: Sequence[Recording],
     PprsError
         As `measure_residuals`.
     """
-    if not model.moves_joints and not model_numbers(model):
+    if not model.has_links and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
     report = progress or (lambda share: None)
@@ -135,7 +135,7 @@ def _errors(folds: Sequence[tuple[DriveModel, Sequence[Recording]]]) -> dict[str
 
 
 def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
-    if model.is_mechanism or not model_numbers(model):
+    if model.has_bodies or not model_numbers(model):
         return fit_mechanism(model, recordings)
     # As in a diagnosis without any effect: the tolerance is the prior, and the width in which
     # friction reverses is free.

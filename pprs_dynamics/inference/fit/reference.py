@@ -440,7 +440,7 @@ def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array,
 def _base(model: DriveModel, found: Sequence[Reconstruction], efforts: Array,
           prior: Array | None = None) -> tuple[Array, Array]:
     """Return columns (M, D, P) of unit variance of the base's numbers, and that prior, (N, P)."""
-    if not model.is_mechanism:
+    if not model.has_bodies:
         return np.zeros((*efforts.shape, 0)), np.zeros((0, 0))
     numbers = base_numbers(model, found)
     prior = base_prior(model, efforts, numbers) if prior is None else prior

@@ -19,12 +19,12 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import Reading
 from pprs_dynamics.inference.residuals.excerpt import PIECE, Excerpt, excerpt_of
-from pprs_dynamics.inference.residuals.reconstruction import motion_of_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY
@@ -202,7 +202,7 @@ def _root(columns: Array, followed: NDArray[np.bool_], effort: Array) -> Array:
 def _balance(model: DriveModel, position: Array) -> Array:
     """Return the weights of bodies on each drive, (D,), over their sum; at least 1."""
     robot = model.robot
-    if not model.moves_joints or not len(position):
+    if not len(position):
         return np.ones(len(model.drives))
     some = position[::max(1, len(position) // table.LEAST_MEANS)]
     try:
@@ -264,8 +264,8 @@ def forces_of(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     rigid, others = [], np.zeros_like(still)
     with np.errstate(all='ignore'):
         for moved in (motion, replace(motion, velocity=still, acceleration=still)):
-            followed = motion_of_drives(model, time, moved).with_time(time)
-            forces = model.drive_forces(followed)
+            forces = model.drive_forces(JointMotion(
+                moved.position, moved.velocity, moved.acceleration, time))
             rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
                                 axis=0))
             if not len(rigid) > 1:

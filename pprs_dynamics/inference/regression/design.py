@@ -155,10 +155,9 @@ class Design:
         progress : callable, optional
             Called with the share that is done.
         """
-        report, parts = progress or (lambda share: None), 2 * len(recordings)
+        report = progress or (lambda share: None)
         design = cls._evaluated(model, model, tuple(
-            reconstruct(model, recording, progress_of(report, k, parts))
-            for k, recording in enumerate(recordings)), report)
+            reconstruct(model, recording) for recording in recordings), report)
         design._drop_unknown_past()
         return design
 
@@ -323,7 +322,7 @@ class Design:
         for k, reconstruction in enumerate(reconstructions):
             collector = ColumnCollector(sensitivities, reconstruction)
             tables.append(treated_table(model, reconstruction, progress_of(
-                report, len(reconstructions) + k, 2 * len(reconstructions)), collector))
+                report, k, len(reconstructions)), collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = {**known, **stacked_columns(tables)}

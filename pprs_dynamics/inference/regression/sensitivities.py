@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain, islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,11 +33,12 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.model.keys import GAIN
 
-# A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
+# A number is moved by this share of itself, a coefficient by this share of its scale: rounding
+# and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
 # Of slow columns, see `Samples`; friction of a closed form turns where loads change sign.
-NODES_PER_PERIOD, CLOSED_FORM_NODES = 40, 120
+NODES_PER_PERIOD, GUIDE_NODES = 40, 120
 # Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
 PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
              'friction.drives.coulomb')
@@ -169,13 +171,12 @@ class Sensitivities:
             For its samples.
         """
         state: Any = forces.mechanism
-        is_closed_form = not self.model.moves_joints
         slow = samples = Samples.of(
             state, treat, [effect for effect in self.model.effects
                            if isinstance(effect, MeasurementEffect)],
-            CLOSED_FORM_NODES if is_closed_form else NODES_PER_PERIOD)
-        if is_closed_form:
-            # Friction follows the loads of the closed form: splines would be 1 % off.
+            GUIDE_NODES if state.robot.has_guides else NODES_PER_PERIOD)
+        if state.robot.has_guides:
+            # Friction follows the loads of the guides: splines would be 1 % off.
             samples = replace(slow, at=np.arange(len(state.velocity)), nodes=state)
         there = {effect.name for effect in self.given.effects}
         effects = {name: effect for name, effect in {
@@ -185,19 +186,10 @@ class Sensitivities:
             if name not in self.known}
         bodies = {name: effect for name, effect in effects.items()
                   if issubclass(effect, BodyEffect)}
-        heavier = [] if NUMBERS in self.known else self._heavier
-        nodes, before = samples.nodes, self._own_efforts(samples.nodes)
-        changes = (self._efforts(self.model, loaded) - before for loaded in nodes.robot.under_loads(
-            nodes, [*(self._at(moved, nodes) for moved in heavier),
-                    *(loaded for body in bodies.values()
-                      for loaded in self._with_bodies(body, nodes))]))
-        columns: dict[str, Array] = {}
+        nodes, columns = samples.nodes, {}
+        states = {name: self._with_bodies(body, nodes) for name, body in bodies.items()}
         if NUMBERS not in self.known:
-            columns[NUMBERS] = self._of_numbers(forces, samples, {
-                id(moved): samples.interpolated([next(changes)])[:, 0] for moved in heavier})
-        for name, body in bodies.items():
-            columns[name] = samples.interpolated(
-                [next(changes) / c.scale for c in body.coefficients])
+            states[NUMBERS] = [self._at(moved, nodes) for moved in self._heavier]
         if OF_DRIVES not in self.known:
             columns[OF_DRIVES] = samples.treated(reversal_columns(
                 self.dry(state), state.velocity, state.direction,
@@ -207,6 +199,15 @@ class Sensitivities:
                     columns[OF_JOINTS] = samples.treated(
                         [*passive_reversal_columns(friction, state)])
                     columns[BY_FRICTION] = samples.treated(self._under_friction(friction, state))
+        together = nodes.robot.under_loads(nodes, [*chain.from_iterable(states.values())])
+        changes = {name: [self._efforts(self.model, loaded) - self._own_efforts(nodes)
+                          for loaded in islice(together, len(group))]
+                   for name, group in states.items()}
+        if NUMBERS in changes:
+            columns[NUMBERS] = self._of_numbers(forces, samples, changes[NUMBERS])
+        for name, body in bodies.items():
+            columns[name] = samples.interpolated(changes[name]) / np.array(
+                [[RELATIVE_STEP * c.scale] for c in body.coefficients])
         if self.of_zeros and HOMING not in self.known:
             columns[HOMING], columns[INERTIA] = map(
                 replace(slow, sensors=[]).interpolated, self._of_shifted_positions(slow.nodes))
@@ -233,13 +234,10 @@ class Sensitivities:
 
         Of each drive, (N, D) each.
         """
-        step, drives = state.robot.position_step, range(len(self.model.drives))
-        before = self._own_efforts(state)
-        still = self._at(self.model, state).rigid_force
+        step, before = state.robot.position_step, self._own_efforts(state)
         return ([(self._efforts(self.model, self._at(self.model, state.perturbed(drive, -step)))
-                  - before) / step for drive in drives],
-                [still - self._at(self.model, state.accelerated(drive, 1.0)).rigid_force
-                 for drive in drives])
+                  - before) / step for drive in range(len(self.model.drives))],
+                [*-state.robot.inertia(state)])
 
     def _efforts(self, model: DriveModel, state: Any) -> Array:
         """Return efforts at a state, without effects that know their past."""
@@ -300,9 +298,11 @@ class Sensitivities:
         return [*{id(moved): moved for number, moved in self._moved.items() if number.key != GAIN
                   and not number.key.startswith(('friction.', 'geometry.'))}.values()]
 
-    def _of_numbers(self, forces: Any, samples: Samples, changes: dict[int, Array]) -> Array:
-        """Return the columns of all numbers, (M, K, D); `changes` by moved model, of bodies."""
+    def _of_numbers(self, forces: Any, samples: Samples, heavier: Sequence[Array]) -> Array:
+        """Return the columns of all numbers, (M, K, D), with the changes by `_heavier`."""
         columns = np.zeros((len(samples.treat), len(self.numbers), len(self.model.drives)))
+        changes = {id(moved): samples.interpolated([change])[:, 0]
+                   for moved, change in zip(self._heavier, heavier, strict=True)}
         for row, number in enumerate(self.numbers):
             moved = self._moved[number]
             if id(moved) not in changes:
@@ -322,7 +322,7 @@ class Sensitivities:
         if number.key.startswith('friction.'):
             found = state.with_smoothing(moved.reversal)
         else:  # of the geometry: with it friction turns over at other times
-            found = self._at(moved, moved.at_drives(state))
+            found = self._at(moved, moved.mechanism(state))
         return samples.treated([self._efforts(moved, found) - self._own_efforts(state)])
 
     def _present(self, effect: type[StructureEffect]) -> StructureEffect | None:
@@ -342,7 +342,7 @@ class Sensitivities:
                  - before) / c.scale for c in effect.coefficients]
 
     def _with_bodies(self, effect: type[BodyEffect], state: Any) -> list[Any]:
-        """Return the state with an effect on bodies, one for the scale of each coefficient.
+        """Return the state with an effect on bodies, one for a step of each coefficient.
 
         Around the values that the model has, but those of added bodies are around none:
         `AddedBody.around` makes them exact for where one is.
@@ -352,8 +352,9 @@ class Sensitivities:
             present = None
         if effect not in self._steps:
             values = {} if present is None else effect.to_coefficients(present.values)
-            self._steps[effect] = [effect.at({**values, c.name: values.get(c.name, 0.0) + c.scale})
-                                   for c in effect.coefficients]
+            self._steps[effect] = [effect.at({
+                **values, c.name: values.get(c.name, 0.0) + RELATIVE_STEP * c.scale})
+                for c in effect.coefficients]
         return [moved.apply(state) if present is None else self._at(replace(
             self.model, effects=tuple(moved if other is present else other
                                       for other in self.model.effects)), state)

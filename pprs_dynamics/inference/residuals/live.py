@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.samples import Mask
 from pprs_dynamics.measurement.motion.differentiation import ORDER, LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
-# Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
-MECHANISM_WINDOW = 0.25  # [s]
+# Robots with gears move ten times as slowly as the 3-PPRS, with ten times the inertia.
+GEAR_WINDOW = 0.25  # [s]
 ERROR_SPAN = 2.0  # [s] over which the running error is taken
 # Stamps to see before their step is known; more than a late first message or two.
 STAMPS_TO_LEARN = 16
@@ -71,7 +71,7 @@ class LiveComparison:
 
     def __init__(self, model: DriveModel, window: float | None = None, span: float = ERROR_SPAN,
                  ) -> None:
-        self._window = window or (MECHANISM_WINDOW if model.moves_joints else WINDOW)
+        self._window = window or (WINDOW if model.robot.has_guides else GEAR_WINDOW)
         self._span = span
         self._learning: list[tuple[float, ArrayLike, ArrayLike]] = []
         self._live: LiveReconstruction | None = None
@@ -85,7 +85,6 @@ class LiveComparison:
         """Compare with another model from the next sample on; the running error starts afresh."""
         self._state = model.continued_state(self._model, self._state)
         self._model = model
-        self._closed: dict[Any, Array] = {}
         self._recent.clear()
 
     @property
@@ -126,16 +125,12 @@ class LiveComparison:
             return None
         starts = [k for k, sample in enumerate(samples) if sample.is_start]
         model_effort = []
-        try:
-            for first, last in zip([0, *starts], [*starts, len(samples)], strict=True):
-                if first == last:
-                    continue
-                if first in starts:
-                    self._begin_again(samples[first].time)
-                model_effort.append(self._forces(samples[first:last]))
-        except PprsError:
-            self._closed = {}
-            raise
+        for first, last in zip([0, *starts], [*starts, len(samples)], strict=True):
+            if first == last:
+                continue
+            if first in starts:
+                self._begin_again(samples[first].time)
+            model_effort.append(self._forces(samples[first:last]))
         time = np.array([sample.time for sample in samples])
         model = np.concatenate(model_effort)
         residual = np.stack([sample.effort for sample in samples]) - model
@@ -157,7 +152,6 @@ class LiveComparison:
         start = self._state.start
         self._state = self._model.initial_state(
             start if start is not None and start <= time else None)
-        self._closed = {}
 
     def running_error(self) -> Array:
         """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
@@ -193,12 +187,11 @@ class LiveComparison:
     def _forces(self, samples: list[LiveSample]) -> Array:
         model: Any = self._model
         position = np.stack([sample.position for sample in samples])
-        motion = model.robot.motion_of_drives(
+        forces = model.drive_forces(JointMotion(
             position - model.position_error(position),
             np.stack([sample.velocity for sample in samples]),
-            np.stack([sample.acceleration for sample in samples]), self._closed)
-        forces = model.drive_forces(
-            motion.with_time([sample.time for sample in samples]), self._state)
+            np.stack([sample.acceleration for sample in samples]),
+            np.array([sample.time for sample in samples])), self._state)
         total: Array = model.measured(forces, self._state).total
         return total
 

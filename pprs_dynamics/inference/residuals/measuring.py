@@ -58,18 +58,17 @@ def measure_residuals(
     ------
     MotionError
         Where a recording is too short.
-    ConvergenceError, WorkspaceError, SingularityError
+    WorkspaceError, SingularityError
         Where the model cannot follow a recording.
     ResidualsError
         Where no effort was measured.
     """
     tables: list[dict[Any, Array]] = []
     notes: list[str] = []
-    parts = 2 * len(recordings)
     for k, recording in enumerate(recordings):
-        reconstruction = reconstruct(model, recording, progress_of(progress, 2 * k, parts))
+        reconstruction = reconstruct(model, recording)
         tables.append(treated_table(model, reconstruction,
-                                    progress_of(progress, 2 * k + 1, parts)))
+                                    progress_of(progress, k, len(recordings))))
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.
         del reconstruction

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.errors import MotionError, WorkspaceError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import (
@@ -32,15 +32,13 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import QUANTITIES, PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
-CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
-Motion = PlatformMotion | JointMotion
+CHUNK = 4_000  # samples at a time; a million at once would take gigabytes
 MOTION = ('position', 'velocity', 'acceleration')
 
 
@@ -50,7 +48,7 @@ class Chunk:
 
     Parameters
     ----------
-    motion : PlatformMotion or JointMotion
+    motion : JointMotion
         With times.
     samples, blocks : slice
         Its place in the reconstruction, before and after treatment.
@@ -60,7 +58,7 @@ class Chunk:
         For these samples alone.
     """
 
-    motion: Motion
+    motion: JointMotion
     samples: slice
     blocks: slice
     is_start: bool
@@ -69,14 +67,12 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Reconstruction(DriveMotion):
-    """Motion of the drives and what they move, with effort; N samples, and M blocks of them.
+    """Motion of the drives with effort; N samples, and M blocks of them.
 
     Parameters
     ----------
     time : (N,) array
         [s].
-    motion : PlatformMotion or JointMotion
-        Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
         As measured [N]; NaN where it was not, where a drive stands whose effort then means
         nothing, and where it is late and of motion before its segment.
@@ -99,7 +95,6 @@ class Reconstruction(DriveMotion):
     """
 
     time: Array
-    motion: Motion
     effort: Array
     treat: Treatment
     gain: Array
@@ -111,6 +106,11 @@ class Reconstruction(DriveMotion):
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def motion(self) -> JointMotion:
+        """The motion without times, which need not increase from segment to segment."""
+        return JointMotion(self.position, self.velocity, self.acceleration)
 
     def recorded_share(self, model: DriveModel) -> Array:
         """Return by what a model's efforts are multiplied to be those of the recording, (D,).
@@ -158,65 +158,20 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def motion_of_drives(model: DriveModel, time: Array, drives: DriveMotion,
-                     progress: Progress | None = None) -> Motion:
-    """Return the motion, without times, that belongs to one of the drives.
-
-    Parameters
-    ----------
-    model : DriveModel
-    time : (N,) array
-        [s].
-    drives : DriveMotion
-    progress : callable, optional
-        Called with (samples done, all) now and then.
-
-    Raises
-    ------
-    ConvergenceError
-        Where drive positions do not close the mechanism.
-    """
-    parts: list[Any] = []
-    for segment in drives.segments:
-        closed: dict[Any, Array] = {}
-        for start in range(segment.start, segment.stop, CHUNK):
-            rows = slice(start, min(start + CHUNK, segment.stop))
-            try:
-                parts.append(model.robot.motion_of_drives(
-                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows],
-                    closed))
-            except ConvergenceError as error:
-                sample = start + error.sample
-                raise ConvergenceError(
-                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
-                    error.rule) from None
-            if progress is not None:
-                progress(rows.stop, len(time))
-    kind = type(parts[0])
-    names = QUANTITIES if kind is PlatformMotion else MOTION
-    motion: Motion = kind(*(np.concatenate([getattr(part, name) for part in parts])
-                            for name in names))
-    return motion
-
-
-def reconstruct(
-    model: DriveModel, recording: Recording, progress: Progress | None = None,
-) -> Reconstruction:
+def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
     model : DriveModel
     recording : Recording
-    progress : callable, optional
-        Called with (samples done, all) now and then.
 
     Raises
     ------
     MotionError
         Where no segment is long enough, or the drives are not the model's.
-    ConvergenceError
-        Where drive positions do not close the mechanism.
+    WorkspaceError, SingularityError
+        Of a model whose encoders err by loads, see `DriveModel.drive_forces`.
     """
     names = model.drives
     if tuple(recording.drives) != names:
@@ -228,7 +183,7 @@ def reconstruct(
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
-    drives, motion = _followed_rightly(model, recording, read, time, windup, progress)
+    drives = _followed_rightly(model, recording, read, windup)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short']
@@ -241,7 +196,7 @@ def reconstruct(
     drives = replace(drives, notes=tuple(notes))
     gain = np.full(len(names), np.nan) if recording.gain is None else recording.gain
     return Reconstruction(
-        **vars(drives), time=time, motion=motion, effort=effort,
+        **vars(drives), time=time, effort=effort,
         treat=Treatment(drives.block_starts, total), gain=gain,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup).with_known_past(model.lateness)
@@ -254,15 +209,13 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
 
     Raises
     ------
-    ConvergenceError
-        Where drive positions do not close the mechanism.
+    WorkspaceError, SingularityError
+        See `reconstruct`.
     """
-    drives, motion = _followed_rightly(
-        model, reconstruction.recorded, reconstruction.read, reconstruction.time,
-        reconstruction.windup)
+    drives = _followed_rightly(model, reconstruction.recorded, reconstruction.read,
+                               reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
-                   acceleration=drives.acceleration, smoothing=drives.smoothing,
-                   motion=motion)
+                   acceleration=drives.acceleration, smoothing=drives.smoothing)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
@@ -295,32 +248,30 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
     return found[0] + smoothed[0], found[1] + smoothed[1], found[2] + smoothed[2]
 
 
-def _followed_rightly(
-    model: DriveModel, recording: Recording, read: DriveMotion, time: Array,
-    windup: Array | None, progress: Progress | None = None,
-) -> tuple[DriveMotion, Motion]:
-    """Return the true motion of the drives, and of what they move, behind that which was read."""
+def _followed_rightly(model: DriveModel, recording: Recording, read: DriveMotion,
+                      windup: Array | None) -> DriveMotion:
+    """Return the true motion of the drives behind that which was read."""
     if not model.position_effects:
-        return read, motion_of_drives(model, time, read, progress)
+        return read
     q, q_dot, q_ddot = misread(model.position_effects, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
     if np.any(q_dot) and not all(effect.is_of_position for effect in model.position_effects):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
-    followed = motion_of_drives(model, time, drives, progress)
     if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
-        return drives, followed
+        return drives
+    followed = JointMotion(drives.position, drives.velocity, drives.acceleration)
     # Loads hardly change by what they do to positions: one step is enough.
     load = np.concatenate([
         model.mechanism(followed[start:start + CHUNK]).transmitted
-        for start in range(0, len(time), CHUNK)])
+        for start in range(0, len(followed), CHUNK)])
     drives = replace(drives, position=drives.position - model.loaded_position_error(load))
     if windup is not None:
         q, q_dot, q_ddot = model.windup_error(load, windup)
         drives = replace(drives, position=drives.position - q, velocity=drives.velocity - q_dot,
                          acceleration=drives.acceleration - q_ddot)
-    return drives, motion_of_drives(model, time, drives, progress)
+    return drives
 
 
 def _windup(recording: Recording, read: DriveMotion) -> Array | None:
@@ -373,7 +324,13 @@ def measured_forces(
     for chunk in reconstruction.chunks():
         if chunk.is_start:
             state = model.initial_state(reconstruction.start)
-        forces = model.measured(model.drive_forces(chunk.motion, state), state)
+        try:
+            forces = model.measured(model.drive_forces(chunk.motion, state), state)
+        except WorkspaceError as error:
+            sample = chunk.samples.start + error.sample
+            raise type(error)(
+                int(reconstruction.index[sample]),
+                f'at {reconstruction.time[sample]:.6g} s {error.found}', error.rule) from None
         yield chunk, forces, {name: values * share for name, values in {
             **forces.parts, 'total': forces.total}.items()}
 

@@ -65,7 +65,6 @@ ADDS_TO: Mapping[tuple[str, str], tuple[Total, ...]] = {
        for name, way in zip(VISCOUS, BOTH, strict=True)},
     **{(AsymmetricFriction.name, name): ((DRY_FRICTION, way),)
        for name, way in zip(FORCES, BOTH, strict=True)}}
-MASSES = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods')
 
 # Of a body's size: how far inside the set of possible bodies a plane is, so that few planes
 # suffice; and what rounding may violate.
@@ -266,8 +265,6 @@ def own_total(design: Design, drive: int, of: str) -> float:
 def _own_inertia(design: Design, drive: int) -> float:
     """Return the largest inertia of a drive that moves alone [kg, kg m^2]."""
     model = design.given
-    if not model.moves_joints:  # at most all of its masses
-        return float(sum(np.sum(model.values[key]) for key in MASSES))
     position = design.residuals.variables['position']
     still, pushed = np.zeros_like(position), np.zeros_like(position)
     pushed[:, drive] = 1.0

@@ -52,8 +52,7 @@ class LiveReconstruction:
     Answers equal those of `reconstruct` with the same window for samples at equal steps. Where
     stamps are uneven, the motion is the smoother one of that with samples at their stamps and
     that with samples at equal steps, which came late. Where one or two samples are missing it is
-    that of the others. The platform's motion then follows by
-    `ThreePprs.motion_of_drives`, from the last pose on.
+    that of the others.
 
     Parameters
     ----------

@@ -41,9 +41,16 @@ from pprs_dynamics.physics.mechanism.structure import (
     independent_rows,
     opening,
 )
-from pprs_dynamics.physics.mechanism.tree_equations import Data, Integers, JointFriction, Loads
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    NO_FRICTION,
+    Data,
+    Integers,
+    JointFriction,
+    Loads,
+)
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
+NO_GUIDES = np.zeros(0, dtype=np.int64)
 SLIDES = 3  # the first of them
 AXES = np.eye(3)[[0, 1, 2, 2, 1, 0]]
 POSE = 'tool_pose.'  # what the names of their joints begin with
@@ -73,7 +80,8 @@ class LinkMotion:
         rows, failed = structure.evaluation.forward_kinematics(
             position, velocity, acceleration, start, nearby)
         if failed >= 0:
-            raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
+            raise WorkspaceError(failed, 'the loops do not close for drives at '
+                                 f'{np.round(position[failed], 6).tolist()}',
                                  'must be within reach, on the way from home')
         found = cls(structure, rows)
         if len(structure.tables.passive):
@@ -152,13 +160,12 @@ class LinkMotion:
         gravity : (3,) array
         load : StructureLoad, optional
         """
-        evaluation = self.structure.evaluation
-        table = np.zeros((len(self.rows), tree.length_of(Loads, evaluation.sizes)))
-        found = tree.views(Loads, evaluation.sizes, table)
+        table, found = self._no_loads()
         for row, wrench in self.wrenches(load):
             found.f[:, row] += wrench[:, :3]
             found.n[:, row] += wrench[:, 3:]
-        evaluation.run(tree.FORCES | tree.KEPT, self.rows, bodies=(inertial, gravity), loads=table)
+        self.structure.evaluation.run(
+            tree.FORCES | tree.KEPT, self.rows, bodies=(inertial, gravity), loads=table)
         return found
 
     def friction(self, loads: Loads, friction: JointFriction) -> Array:
@@ -172,10 +179,16 @@ class LinkMotion:
     @property
     def tool_velocity(self) -> Array:
         """Linear velocity of the tool's origin and angular velocity, in `base`, (N, 6)."""
-        row, _ = self.structure.links[self.structure.tool]
-        m = self.motion
-        arm = self.frame_of(self.structure.tool).p - m.p[:, row]
-        return np.concatenate((m.u[:, row] + np.cross(m.w[:, row], arm), m.w[:, row]), axis=1)
+        row, m = self.structure.links[self.structure.tool][0], self.motion
+        return np.concatenate(
+            (m.u[:, row] + np.cross(m.w[:, row], self.tool_arm), m.w[:, row]), axis=1)
+
+    @cached_property
+    def tool_arm(self) -> Array:
+        """The tool's origin from that of its joint, in `base`, (N, 3) [m]."""
+        row, frame = self.structure.links[self.structure.tool]
+        arm: Array = self.motion.R[:, row] @ frame.p
+        return arm
 
     def joint_position(self, joint: str) -> Array:
         """Return the position of a passive joint of the tree, (N,) [rad, m]."""
@@ -192,9 +205,8 @@ class LinkMotion:
             return found
         if np.any(load.wrench):
             row, _ = self.structure.links[self.structure.tool]
-            arm = self.frame_of(self.structure.tool).p - m.p[:, row]
             force, moment = load.wrench[:, :3], load.wrench[:, 3:]
-            found.append((row, np.hstack((force, moment + np.cross(arm, force)))))
+            found.append((row, np.hstack((force, moment + np.cross(self.tool_arm, force)))))
         for name, torque in load.torques.items():
             row = self.structure.rows[name]
             along = torque[:, None] * m.z[:, row]
@@ -206,58 +218,50 @@ class LinkMotion:
         return found
 
     def changes_by_loads(
-        self, loads: Loads, friction: JointFriction, guides: Integers, quantities: int, count: int,
-        added: Sequence[tuple[int, int, bool]], bodies: Sequence[Array],
-        applied: Sequence[tuple[int, int]], wrenches: Sequence[Array],
+        self, loads: Loads, friction: JointFriction, guides: Integers, count: int,
+        added: Sequence[tuple[Any, ...]], bodies: Sequence[Array],
+        applied: Sequence[tuple[int, int]] = (), wrenches: Sequence[Array] = (),
+        quantities: int = 1,
     ) -> Array:
-        """Return changes by columns of bodies and wrenches, (count, quantities, N, D).
+        """Return changes by columns of bodies and wrenches, (count, N, quantities, D).
 
         To first order in them; see `tree_equations.changes_by_loads`.
         """
-        t, samples = self.structure.tables, len(self.rows)
-        columns = quantities * len(t.drives)
-        changes: Array = np.zeros((count, quantities, samples, len(t.drives)))
+        t, samples, columns = self.structure.tables, len(self.rows), quantities * len(
+            self.structure.drives)
+        changes: Array = np.zeros((count, samples, columns))
         run(tree.changes_by_loads, *self.structure.evaluation.packed, self.rows, loads.links,
             loads.loops, np.array(friction), guides,
             np.array(added, dtype=np.int64).reshape(-1, 3),
             np.reshape(bodies, (-1, PARAMETERS + 3)),
             np.array(applied, dtype=np.int64).reshape(-1, 2),
-            np.reshape(wrenches, (-1, samples, 6)), np.empty((len(self.structure.home), columns)),
+            np.reshape(wrenches, (-1, samples, 6)),
+            np.empty((len(self.structure.home), columns)),
             np.empty((len(t.closures), 3, columns)), np.empty((len(t.joints), 6, columns)), changes)
-        return changes
+        return changes.reshape(count, samples, quantities, -1)
 
     def regressor(self, rows: Integers, gravity: Array) -> Array:
         """Return the derivatives of the efforts by the parameters of bodies, (N, D, 10 B)."""
-        m = self.motion
-        R = m.R[:, rows]
+        unit = np.hstack((np.eye(PARAMETERS), np.tile(-gravity, (PARAMETERS, 1))))
+        added = [(k, row, tree.AS_LINK) for k, row in enumerate(np.repeat(rows, PARAMETERS))]
+        found = self.changes_by_loads(self._no_loads()[1], NO_FRICTION, NO_GUIDES, len(added),
+                                      added, [*unit] * len(rows))
+        return np.moveaxis(found[:, :, 0], 0, -1)
 
-        def own(values: Array) -> Array:
-            """Return vectors, or columns of vectors, in the axes of their bodies."""
-            turned: Array = np.einsum('nbji,nbj...->nbi...', R, values)
-            return turned
+    def inertia(self, by_joint: Array) -> Array:
+        """Return the efforts by bodies (J + 1, 10) per acceleration of each drive, (D, N, D)."""
+        added = [(drive, row, tree.WITH_DRIVE + drive)
+                 for drive in range(len(self.structure.drives))
+                 for row in np.flatnonzero(by_joint.any(axis=1))]
+        found = self.changes_by_loads(
+            self._no_loads()[1], NO_FRICTION, NO_GUIDES, len(self.structure.drives), added,
+            [np.append(by_joint[row], np.zeros(3)) for _, row, _ in added])
+        return found[:, :, 0]
 
-        W, U = (own(jacobian[:, rows]) for jacobian in self.link_jacobians)
-        w, wd = own(m.w[:, rows])[..., None], own(m.wd[:, rows])[..., None]
-        a = own(m.ud[:, rows] - gravity)[..., None]
-
-        def cross(x: Array, y: Array) -> Array:
-            return np.stack([x[:, :, (i + 1) % 3] * y[:, :, (i + 2) % 3]
-                             - x[:, :, (i + 2) % 3] * y[:, :, (i + 1) % 3] for i in range(3)],
-                            axis=2)
-
-        samples, drives = len(m.q), U.shape[-1]
-        found = np.empty((samples, drives, len(rows), PARAMETERS))
-        found[..., 0] = np.sum(U * a, axis=2).transpose(0, 2, 1)
-        moment = (cross(U, wd) + w * np.sum(U * w, axis=2, keepdims=True)
-                  - U * np.sum(w * w, axis=2, keepdims=True) + cross(a, W))
-        found[..., 1:4] = moment.transpose(0, 3, 1, 2)
-        c = cross(W, w)
-        for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))):
-            column = W[:, :, i] * wd[:, :, j] + c[:, :, i] * w[:, :, j]
-            if i != j:
-                column = column + W[:, :, j] * wd[:, :, i] + c[:, :, j] * w[:, :, i]
-            found[..., 4 + k] = column.transpose(0, 2, 1)
-        return found.reshape(samples, drives, -1)
+    def _no_loads(self) -> tuple[Array, Loads]:
+        sizes = self.structure.evaluation.sizes
+        table = np.zeros((len(self.rows), tree.length_of(Loads, sizes)))
+        return table, tree.views(Loads, sizes, table)
 
 
 class ToolPose:
@@ -344,8 +348,7 @@ class ToolPose:
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
             rows[:, self._drives].copy() for rows in (found.q, found.v, found.a))
-        return (JointMotion(position, velocity, acceleration, motion.time,
-                            channels=motion.channels),
+        return (JointMotion(position, velocity, acceleration, motion.time),
                 found.q[:, self._own])
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:

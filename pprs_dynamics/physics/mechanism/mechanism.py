@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
@@ -42,7 +43,9 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import (
     EFFORTS,
     FORCES,
+    GUIDE,
     JOINT_EFFORT,
+    LOAD,
     MOTION,
     NO_FRICTION,
     RIGID,
@@ -52,7 +55,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     JointFriction,
 )
 
-NO_GUIDES = np.zeros(0, dtype=np.int64)
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 
 
@@ -170,14 +172,13 @@ class Mechanism:
         """Mass of all bodies [kg]."""
         return float(self.masses.sum())
 
-    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       is_own: bool = False) -> Any:
-        """Return friction of joints as `MechanismState.friction_efforts` takes it."""
-        return self.tree_friction(blocks, reversal)
+    def joints_of(self, name: str) -> tuple[str, ...]:
+        """Return the joints of the tree that have a name, or share one."""
+        return next((joint.joints for joint in self.passive_joints if joint.name == name), (name,))
 
-    def tree_friction(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                       ) -> JointFriction:
-        """Return friction of joints of the tree.
+        """Return friction of joints as `MechanismState.friction_efforts` takes it.
 
         Parameters
         ----------
@@ -187,8 +188,8 @@ class Mechanism:
         reversal : Reversal
             In drives by their velocity, in all others by their rate, or that of slides.
         """
-        structure, of = self.structure, {joint.name: joint.joints for joint in self.passive_joints}
-        blocks = {joint: block for name, block in blocks.items() for joint in of.get(name, (name,))}
+        structure = self.structure
+        blocks = {joint: block for name, block in blocks.items() for joint in self.joints_of(name)}
         widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
                           strict=True))
         rows = structure.friction_rows
@@ -258,7 +259,12 @@ class Mechanism:
         structure = self.structure
         return SLIDE if structure.kinds == (PRISMATIC,) and not structure.loops else MECHANISM
 
-    @property
+    # Whether drives rub under the load across their guides, else under that of their gears; and
+    # whether motions are planned and commanded as poses of the platform, else as those of drives.
+    has_guides: ClassVar[bool] = False
+    plans_poses: ClassVar[bool] = False
+
+    @cached_property
     def motions(self) -> tuple[type, ...]:
         """Kinds of motion that have forces: of the drives, and of the tool where it has loops."""
         return (JointMotion, PlatformMotion) if self.structure.loops else (JointMotion,)
@@ -285,10 +291,10 @@ class Mechanism:
         """
         return ToolPose(self.structure)
 
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         closed: dict[Any, Array] | None = None) -> Any:
-        """Return the motion of the drives; loops are closed where forces are evaluated."""
-        return JointMotion(position, velocity, acceleration)
+    def drive_motion(self, motion: PlatformMotion, closed: dict[Any, Array] | None = None,
+                     ) -> tuple[JointMotion, Array]:
+        """Return the motion of the drives for that of the tool; see `ToolPose.drives`."""
+        return self.tool_pose.drives(motion, closed)
 
     def at_home(self, samples: int) -> Any:
         """Return the drives at rest where the description has them, one sample a second."""
@@ -301,15 +307,15 @@ class Mechanism:
               found: InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
         closed = {} if closed is None else closed
-        start, nearby, pose = None, closed.get(self.structure), None
+        start, nearby = None, closed.get(self.structure)
         if isinstance(motion, PlatformMotion):
             # The assembly is that of the pose, whichever the same drives would find from home.
-            pose, nearby = motion, None
-            motion, start = self.tool_pose.drives(motion, closed)
+            nearby, (motion, start) = None, self.drive_motion(motion, closed)
         state = MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
                                channels=motion.channels, robot=self, reversal=reversal,
-                               start=start, nearby=nearby, friction=friction, motion=pose)
+                               start=start, nearby=nearby, friction=friction)
         if found is not None:
+            found = found if found.q is not None else found._replace(q=start)
             vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
         return state
 
@@ -317,11 +323,6 @@ class Mechanism:
         """Store the coordinates of the last sample, near which the next loops close."""
         if len(state) and self.structure.loops:
             closed[self.structure] = state.closed[-1].copy()
-
-    def tree_motion(self, state: MechanismState) -> LinkMotion:
-        """Return the motion of the links of the tree in a state."""
-        links: LinkMotion = state.links
-        return links
 
     def kinematics(self, state: MechanismState) -> Any:
         """Return the motion of all links in a state."""
@@ -347,7 +348,7 @@ class Mechanism:
                     (other.robot.by_joint - self.by_joint, True, -gravity),
                     (self.by_joint, False, self.gravity_row - gravity)):
                 for row in np.flatnonzero(table.any(axis=1)) if moves or pull.any() else ():
-                    added.append((k, row, moves))
+                    added.append((k, row, tree.AS_LINK if moves else tree.STANDS))
                     bodies.append(np.append(table[row], pull))
             for sign, load in ((1, other.load), (-1, state.load)):
                 if other.load is not state.load:
@@ -355,17 +356,24 @@ class Mechanism:
                         applied.append((k, row))
                         wrenches.append(sign * wrench)
         efforts = np.empty((EFFORTS, *state.position.shape))
-        efforts[TRANSMITTED], efforts[JOINT_EFFORT] = (
-            state.transmitted, state.friction_efforts(state.friction))
+        efforts[TRANSMITTED], efforts[JOINT_EFFORT], efforts[LOAD] = (
+            state.transmitted, state.friction_efforts(state.friction), state.friction_load)
         for other, change in zip(others, links.changes_by_loads(
-                state.reactions, state.friction, NO_GUIDES, 2, len(others), added, bodies, applied,
-                wrenches), strict=True):
+                state.reactions, state.friction, self.guides, len(others), added, bodies, applied,
+                wrenches, 3 if self.has_guides else 2), strict=True):
             found = replace(other, friction=state.friction)
             changed = efforts.copy()
-            changed[[TRANSMITTED, JOINT_EFFORT]] += change
+            changed[[TRANSMITTED, JOINT_EFFORT, LOAD][:change.shape[1]]] += change.swapaxes(0, 1)
+            if not self.has_guides:
+                changed[LOAD] = np.abs(changed[TRANSMITTED])
             vars(found)['inverse_dynamics'] = InverseDynamicsResult(
                 links.motion.q, changed, (state.position, state.velocity, state.acceleration))
             yield found
+
+    def inertia(self, state: MechanismState) -> Array:
+        """Return the efforts per acceleration of each drive, (D, N, D) [kg, kg m^2, kg m]."""
+        found: Array = state.links.inertia(self.by_joint)
+        return found + np.diag(self.armature)[:, None]
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
         """Return closed coordinates, efforts and own friction in one pass."""
@@ -375,12 +383,19 @@ class Mechanism:
 
     def friction_parameters(self, joints: Any, drives: Array | None = None) -> Any:
         """Return friction of joints, and of drives (OF_DRIVE, D) or none, for `one_pass`."""
-        return np.array(joints), self.structure.evaluation.no_actuators if (
-            drives is None) else drives
+        drives = np.array(self.structure.evaluation.no_actuators if drives is None else drives)
+        if self.has_guides:
+            drives[GUIDE] = self.guides
+        return np.array(joints), drives
+
+    @cached_property
+    def guides(self) -> Integers:
+        """Joints of drives whose friction follows the force across them."""
+        return np.array([self.structure.rows[name] for name in self.drives if self.has_guides],
+                        dtype=np.int64)
 
     def one_pass(self, motion: Any, parameters: Any, closed: dict[Any, Array] | None,
-                 has_state: bool = False, start: Array | None = None,
-                 ) -> InverseDynamicsResult | None:
+                 start: Array | None = None) -> InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
@@ -392,8 +407,6 @@ class Mechanism:
             See `friction_parameters`.
         closed : dict of Structure to array, optional
             See `ModelState`.
-        has_state : bool
-            Whether the state for the motion is made next from the result.
         start : (N, C) array, optional
             See `Evaluation.forward_kinematics`.
         """
@@ -413,18 +426,18 @@ class Mechanism:
         return InverseDynamicsResult(q, efforts, moved)
 
     def friction_load(self, state: MechanismState) -> Array:
-        """Return the loads of the drives' gears [N m, N], (N, D)."""
-        return np.abs(state.transmitted)
+        """Return the loads of the drives' guides or gears [N m, N], (N, D)."""
+        if state.inverse_dynamics is not None or not self.has_guides:
+            return np.abs(state.transmitted) if state.inverse_dynamics is None else (
+                state.inverse_dynamics.efforts[LOAD])
+        across = np.cross(state.reactions.f[:, self.guides],
+                          state.links.motion.z[:, self.guides])
+        load: Array = np.linalg.norm(across, axis=2)
+        return load
 
     def load_of_friction(self, state: MechanismState, joints: Any) -> StructureLoad | None:
         """Return None: what friction of passive joints adds to the loads is neglected."""
         return None
-
-    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
-                  ) -> MechanismState:
-        """Return the state at other positions and accelerations of the drives."""
-        return replace(state, position=position, acceleration=acceleration, known=None,
-                       motion=None)
 
     def singularity_margin(self, state: MechanismState) -> float | None:
         """Return 1 minus the condition number of the closures over its limit; None without any."""

@@ -14,7 +14,7 @@ first point is the one that is executed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from math import isfinite
 from typing import Any
@@ -36,7 +36,6 @@ QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
 WIDTHS = [3, 4, 3, 3, 3, 3]
 ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
 FLOAT = np.dtype(np.float64)
-NO_CHANNELS: Mapping[str, Array] = {}
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
@@ -253,8 +252,6 @@ class PlatformMotion:
     ----------
     rows : (N, 19) array
         All of it but the times, in the order of the parameters: what kernels take.
-    channels : mapping of str to (N, 6) array
-        Further measurements of the drives, such as `temperature` [degC].
 
     Raises
     ------
@@ -265,7 +262,6 @@ class PlatformMotion:
 
     rows: Array
     time: Array | None = None
-    channels: Mapping[str, Array] = NO_CHANNELS
 
     def __init__(
         self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
@@ -282,13 +278,11 @@ class PlatformMotion:
             self.__dict__['time'] = checked_times(time, len(rows))
 
     @classmethod
-    def _of(cls, rows: Array, time: ArrayLike | None,
-            channels: Mapping[str, Array] = NO_CHANNELS) -> PlatformMotion:
+    def _of(cls, rows: Array, time: ArrayLike | None) -> PlatformMotion:
         """Return the motion of rows that are known to be right."""
         motion = object.__new__(cls)
         motion.__dict__['rows'] = rows
         motion.__dict__['time'] = None if time is None else checked_times(time, len(rows))
-        motion.__dict__['channels'] = channels
         return motion
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -306,9 +300,7 @@ class PlatformMotion:
         if not len(rows):
             raise MotionError('position', f'its shape is {(0, 3)}',
                               'be (N, 3) with N of at least 1', 'shape')
-        return PlatformMotion._of(
-            rows, None if self.time is None else self.time[index],
-            {name: values[index] for name, values in self.channels.items()})
+        return PlatformMotion._of(rows, None if self.time is None else self.time[index])
 
     position = _columns(0, 3, 'P [m], (N, 3).')
     orientation = _columns(3, 7, 'Unit quaternions x, y, z, w, (N, 4).')
@@ -326,17 +318,7 @@ class PlatformMotion:
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
         """Return the motion with other times [s]."""
-        return PlatformMotion._of(self.rows, time, self.channels)
-
-    def with_channels(self, channels: Mapping[str, Array]) -> PlatformMotion:
-        """Return the motion with measured channels of the drives, (N, 6) each."""
-        return PlatformMotion._of(self.rows, self.time, channels)
-
-    def accelerated(self, change: Array) -> PlatformMotion:
-        """Return the motion with other linear and angular accelerations, by (N, 6)."""
-        rows = self.rows.copy()
-        rows[:, 13:] += change
-        return PlatformMotion._of(rows, self.time, self.channels)
+        return PlatformMotion._of(self.rows, time)
 
     def resampled(self, rate: float) -> PlatformMotion:
         """Return the motion at a constant rate.

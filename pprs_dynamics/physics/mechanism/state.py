@@ -114,9 +114,8 @@ class StructureLoad(NamedTuple):
     ----------
     wrench : (N, 6) array
         Force [N] and moment [N m] that the tool applies at its origin, in `base`.
-    torques : mapping of str to (N,) or (N, 3) array
-        By passive joint, what resists a growing position [N m, N]; a column for each of several
-        joints of one name.
+    torques : mapping of str to (N,) array
+        By joint of the tree, what resists a growing position [N m, N].
     """
 
     wrench: Array
@@ -145,14 +144,12 @@ class MechanismState(JointMotion):
     robot : Mechanism
     reversal : Reversal
     load : StructureLoad, optional
-    known : LinkMotion or ClosedForm, optional
+    known : LinkMotion, optional
         The kinematics, where they are known.
-    friction : JointFriction or Joints
+    friction : JointFriction
         The model's own, which is computed together with the efforts.
     start, nearby : (N, C) and (C,) arrays, optional
         See `Evaluation.forward_kinematics`.
-    motion : PlatformMotion, optional
-        The motion of the tool, where the state was made from it.
     """
 
     robot: Any = field(kw_only=True)
@@ -162,12 +159,11 @@ class MechanismState(JointMotion):
     friction: Any = field(default=NO_FRICTION, kw_only=True)
     start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
-    motion: Any = field(default=None, kw_only=True)
 
     def __getitem__(self, samples: Any) -> Self:
         """Return the samples that a slice, a mask or indices select, with their load."""
-        return replace(super().__getitem__(samples), known=None, start=None, nearby=None,
-                       motion=None if self.motion is None else self.motion[samples],
+        return replace(super().__getitem__(samples), known=None, nearby=None,
+                       start=None if self.start is None else self.start[samples],
                        load=None if self.load is None else self.load.at(samples))
 
     @property
@@ -186,19 +182,19 @@ class MechanismState(JointMotion):
 
     @cached_property
     def links(self) -> Any:
-        """The kinematics: a `LinkMotion`, or a `ClosedForm` of the 3-PPRS."""
+        """The kinematics, a `LinkMotion`."""
         return self.robot.kinematics(self) if self.known is None else self.known
 
     @property
     def closed(self) -> Array:
         """Closed coordinates, (N, C)."""
-        closed: Array = (self.links.motion.q if self.inverse_dynamics is None
-                         else self.inverse_dynamics.q)
+        found = self.inverse_dynamics
+        closed: Array = self.links.motion.q if found is None else found.q
         return closed
 
     @cached_property
     def reactions(self) -> Any:
-        """Frictionless efforts and reactions: `Loads`, or a `ClosedForm` of the 3-PPRS."""
+        """Frictionless efforts and reactions, `Loads`."""
         return self.robot.loads(self.links, self.load)
 
     @cached_property
@@ -236,7 +232,7 @@ class MechanismState(JointMotion):
         return velocity
 
     def joint_position(self, joint: str) -> Array:
-        """Return the position of a passive joint [rad, m], (N,), or (N, 3) of three alike."""
+        """Return the position of a passive joint of the tree [rad, m], (N,)."""
         position: Array = self.links.joint_position(joint)
         return position
 
@@ -244,17 +240,7 @@ class MechanismState(JointMotion):
         """Return the state with a drive at other positions; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
-        return self._perturbed(position, self.acceleration)
-
-    def accelerated(self, drive: int, change: float) -> MechanismState:
-        """Return the state with another acceleration of a drive."""
-        acceleration = self.acceleration.copy()
-        acceleration[:, drive] += change
-        return self._perturbed(self.position, acceleration)
-
-    def _perturbed(self, position: Array, acceleration: Array) -> MechanismState:
-        perturbed: MechanismState = self.robot.perturbed(self, position, acceleration)
-        return perturbed
+        return replace(self, position=position, known=None, start=self.closed, nearby=None)
 
     def friction_efforts(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

@@ -57,14 +57,15 @@ LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
 COLUMN, LINK, MOVES = 0, 1, 2
+STANDS, AS_LINK, WITH_DRIVE = 0, 1, 2  # how bodies move; the last plus the drive's number
 UNIT = 2  # column of `row_reals`
 STRIDE, MEASURE = 0, 1  # columns of `units`
 Q, V, A = 0, 1, 2  # rows of `Data.motion`
 # Of `Data.solution`.
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 # Rows of the parameters of drives, and of the efforts that follow from them.
-ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6
-TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+ARMATURE, VISCOUS, COULOMB, COEFFICIENT, OFFSET, WIDTH, GUIDE, OF_DRIVE = 0, 1, 2, 3, 4, 5, 6, 7
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, LOAD, EFFORTS = 0, 1, 2, 3, 4, 5, 6
 # Names of the numbers of rows of the tables, and of the columns of some.
 SIZES = ('joints', 'coordinates', 'drives', 'passive', 'loops', 'rows', 'path', 'width')
 FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
@@ -80,8 +81,9 @@ WORST_CONDITION = 300.0
 OPEN_IN_MOTION = 1e-3
 TINY = 1e-300
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
-# joints. Where rows are kept there is one for each sample, else one that all use in turn.
-MOTION, FORCES, KEPT = 1, 2, 4
+# joints. Where rows are kept there is one for each sample, else one that all use in turn. Started,
+# each sample has coordinates of its own, near which its loops close.
+MOTION, FORCES, KEPT, STARTED = 1, 2, 4, 8
 
 
 def _vector(k: int) -> Any:
@@ -432,7 +434,7 @@ def update_frame_placements(t: Model, m: Data) -> None:
     for r in range(3):
         for c in range(3):
             links[0, R + r, c] = 1.0 if r == c else 0.0
-        links[0, P, r] = 0.0
+        links[0, P, r] = links[0, Z, r] = 0.0
     for j in range(1, len(t.joints)):
         i = t.joints[j, PARENT]
         s = frames[j, GAIN, 0] * m.motion[Q, t.joints[j, COORDINATE]] + frames[j, GAIN, 1]
@@ -855,16 +857,16 @@ def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
     Parameters
     ----------
     drives : (OF_DRIVE, D) array
-        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, and width
-        of the sign.
+        Armature [kg m^2, kg], viscous and Coulomb friction, friction per load, offset, width of
+        the sign, and the joint across whose guide the load rubs, or 0: that of the gear.
     v, a : (D,) arrays
         Velocities and accelerations of the drives.
     efforts : (EFFORTS, D) array
-        JOINT_EFFORT and TRANSMITTED are given, the other rows are filled in.
+        JOINT_EFFORT, TRANSMITTED and LOAD are given, the other rows are filled in.
     """
     for d in range(len(v)):
         efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
-        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * abs(efforts[TRANSMITTED, d])
+        dry = drives[COULOMB, d] + drives[COEFFICIENT, d] * efforts[LOAD, d]
         efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
                                       + dry * tanh(v[d] / drives[WIDTH, d]))
         efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
@@ -922,6 +924,9 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
         o = elements(read_loads(sizes, loads[at], reals))
         if stages & MOTION:
             q = given[0, s]
+            if stages & STARTED:
+                for c in range(len(home)):
+                    start[c] = closed[s, c]
             # First from coordinates of another motion, then from the last sample, then from home.
             is_closed = is_regular = False
             for trial in range(0 if nearby and s == 0 else 1, 3):
@@ -953,7 +958,9 @@ def evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, sta
             if not stages & KEPT:
                 own = efforts[:, s]
                 for d in range(given.shape[2]):
-                    own[TRANSMITTED, d] = o.efforts[d]
+                    own[TRANSMITTED, d], j = o.efforts[d], int(actuators[GUIDE, d])
+                    own[LOAD, d] = abs(o.efforts[d]) if j == 0 else length(product(
+                        vector(o.links, j, FORCE), vector(m.links, j, Z)))
                 joint_friction(t, m, o, rubbing)
                 for d in range(given.shape[2]):
                     own[JOINT_EFFORT, d] = o.efforts[d]
@@ -1001,15 +1008,14 @@ def virtual_motions(t: Model, m: Data, f: Any, F: Any, rubbing: Any, guides: Any
         Linear velocity of each link's origin, and angular velocity.
     """
     T, links, drives, columns = m.drive_to_joint, m.links, len(t.drives), rates.shape[1]
-    for r in range(columns):
-        for c in range(len(rates)):
+    for c in range(len(rates)):
+        for r in range(columns):
             rates[c, r] = T[c, r] if r < drives else 0.0
-        for j in range(len(moved)):
-            for x in range(6):
-                moved[j, x, r] = 0.0
-        for g in range(len(held)):
-            for x in range(3):
-                held[g, x, r] = 0.0
+    for table in (held, moved):
+        for j in range(len(table)):
+            for x in range(table.shape[1]):
+                for r in range(columns):
+                    table[j, x, r] = 0.0
     if columns > drives:
         for k in range(rubbing.shape[1]):
             j, g = int(rubbing[0, k]), int(rubbing[1, k])
@@ -1045,24 +1051,23 @@ def virtual_motions(t: Model, m: Data, f: Any, F: Any, rubbing: Any, guides: Any
     for row in range(len(t.passive)):
         if t.rows[row, KIND] == TRANSLATION and columns > drives:
             g, e = t.rows[row, LOOP], row_axis(t, m, row)
-            for r in range(drives, columns):
-                slide = e.x * held[g, 0, r] + e.y * held[g, 1, r] + e.z * held[g, 2, r]
-                for c in range(len(t.passive)):
-                    rates[t.passive[c], r] += m.system[c, len(t.passive) + row] * slide
+            for c in range(len(t.passive)):
+                f_x, f_y, f_z = times(m.system[c, len(t.passive) + row], e)
+                for r in range(drives, columns):
+                    rates[t.passive[c], r] += (
+                        f_x * held[g, 0, r] + f_y * held[g, 1, r] + f_z * held[g, 2, r])
     for j in range(1, len(t.joints)):
         i, c, ratio = t.joints[j, PARENT], t.joints[j, COORDINATE], t.frames[j, GAIN, 0]
         z, arm = vector(links, j, Z), minus(vector(links, j, P), vector(links, i, P))
-        first = 3 if t.joints[j, TURNS] else 0
+        turns = 1.0 if t.joints[j, TURNS] else 0.0
+        e, v = times(ratio * turns, z), times(ratio * (1.0 - turns), z)
         for r in range(columns):
-            x, y, w = moved[i, 3, r], moved[i, 4, r], moved[i, 5, r]
-            moved[j, 0, r] += moved[i, 0, r] + y * arm.z - w * arm.y
-            moved[j, 1, r] += moved[i, 1, r] + w * arm.x - x * arm.z
-            moved[j, 2, r] += moved[i, 2, r] + x * arm.y - y * arm.x
-            moved[j, 3, r], moved[j, 4, r], moved[j, 5, r] = x, y, w
-            own = ratio * rates[c, r]
-            moved[j, first, r] += own * z.x
-            moved[j, first + 1, r] += own * z.y
-            moved[j, first + 2, r] += own * z.z
+            own, x, y, w = rates[c, r], moved[i, 3, r], moved[i, 4, r], moved[i, 5, r]
+            moved[j, 0, r] += moved[i, 0, r] + y * arm.z - w * arm.y + own * v.x
+            moved[j, 1, r] += moved[i, 1, r] + w * arm.x - x * arm.z + own * v.y
+            moved[j, 2, r] += moved[i, 2, r] + x * arm.y - y * arm.x + own * v.z
+            moved[j, 3, r], moved[j, 4, r] = x + own * e.x, y + own * e.y
+            moved[j, 5, r] = w + own * e.z
 
 
 def direction_across(f: Any, links: Any, j: int) -> Vector:
@@ -1090,26 +1095,30 @@ def changes_by_loads(sizes: Any, integers: Any, reals: Any, motions: Any, links:
     rubbing, guides : arrays
         See `virtual_motions`, as `rates`, `held` and `moved`, of which there is one for all.
     added : (n, 3) int array
-        Column, link, and whether the body moves as the link does or stands.
+        Column, link, and how the body moves.
     bodies : (n, 13) array
         Inertial parameters, and the acceleration of the body in addition.
     applied : (w, 2) int array
         Column and link of each wrench.
     wrenches : (w, N, 6) array
         That links apply: force, and moment about their origin.
-    changes : (K, Q, N, D) array
-        The first Q quantities of `virtual_motions`.
+    changes : (K, N, R) array
+        Of the quantities of `virtual_motions`.
     """
     t = elements(read_tables(sizes, integers, reals))
     for s in range(len(motions)):
         m = elements(read_motion(sizes, motions[s], reals))
         virtual_motions(t, m, links[s], loops[s], rubbing, guides, rates, held, moved)
         for n in range(len(added)):
-            j, moves = added[n, LINK], 1.0 * added[n, MOVES]
-            a = Vector(bodies[n, 10], bodies[n, 11], bodies[n, 12])
-            force, moment = body_wrench(
-                m.links, j, bodies, n, plus(a, times(moves, vector(m.links, j, UD))),
-                times(moves, vector(m.links, j, W)), times(moves, vector(m.links, j, WD)))
+            j, d = added[n, LINK], added[n, MOVES] - WITH_DRIVE
+            moves = 1.0 if d + WITH_DRIVE == AS_LINK else 0.0
+            a, wd = times(moves, vector(m.links, j, UD)), times(moves, vector(m.links, j, WD))
+            if d >= 0:
+                a = Vector(moved[j, 0, d], moved[j, 1, d], moved[j, 2, d])
+                wd = Vector(moved[j, 3, d], moved[j, 4, d], moved[j, 5, d])
+            pull = Vector(bodies[n, 10], bodies[n, 11], bodies[n, 12])
+            force, moment = body_wrench(m.links, j, bodies, n, plus(a, pull),
+                                        times(moves, vector(m.links, j, W)), wd)
             _add_power(moved, j, force, moment, changes, added[n, COLUMN], s)
         for n in range(len(applied)):
             w = wrenches[n]
@@ -1119,13 +1128,10 @@ def changes_by_loads(sizes: Any, integers: Any, reals: Any, motions: Any, links:
 
 def _add_power(moved: Any, j: int, force: Vector, moment: Vector, changes: Any, k: int, s: int,
                ) -> None:
-    drives = changes.shape[3]
-    for quantity in range(changes.shape[1]):
-        for d in range(drives):
-            r = quantity * drives + d
-            changes[k, quantity, s, d] += (
-                force.x * moved[j, 0, r] + force.y * moved[j, 1, r] + force.z * moved[j, 2, r]
-                + moment.x * moved[j, 3, r] + moment.y * moved[j, 4, r] + moment.z * moved[j, 5, r])
+    for r in range(moved.shape[2]):
+        changes[k, s, r] += (
+            force.x * moved[j, 0, r] + force.y * moved[j, 1, r] + force.z * moved[j, 2, r]
+            + moment.x * moved[j, 3, r] + moment.y * moved[j, 4, r] + moment.z * moved[j, 5, r])
 
 
 def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
@@ -1177,7 +1183,7 @@ class InverseDynamicsResult(NamedTuple):
     q : (N, C) array or None
         Closed coordinates.
     efforts : (EFFORTS, N, D) array
-        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N]; see
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED and LOAD [N m, N]; see
         `closed_form` for the other rows of a 3-PPRS.
     motion : three (N, D) arrays
         Position, velocity and acceleration of the drives.
@@ -1230,8 +1236,7 @@ class Evaluation:
         ----------
         q, v, a : (N, D) arrays
         start : (N, C) array, optional
-            Closed coordinates of the samples; the first one is walked to from there, instead of
-            home.
+            Closed coordinates near those of each sample, which is walked to from there.
         nearby : (C,) array, optional
             Closed coordinates of another motion: used where the first sample is within a stride
             of them and the loops stay assembled as at home, so that nothing depends on them.
@@ -1242,7 +1247,7 @@ class Evaluation:
         failed : int
             The first sample at which the loops do not close, or -1.
         """
-        rows = np.zeros((len(q), self._lengths[0]))
+        rows = np.empty((len(q), self._lengths[0]))
         return rows, self.run(MOTION | KEPT, rows, np.array((q, v, a)), start, nearby)
 
     def run(self, stages: int, rows: Array | None = None, given: Array | None = None,
@@ -1268,14 +1273,16 @@ class Evaluation:
             and what is filled in: closed coordinates (N, C) and efforts (EFFORTS, N, D).
         """
         warm = nearby is not None
-        first = (nearby if nearby is not None else
-                 self.home if start is None or not len(start) else start[0])
         rows = np.empty((1, self._lengths[0])) if rows is None else rows
+        results = results or (np.array(NO_FRICTION), self.no_actuators,
+                              np.empty((len(rows), len(self.home))), self._no_efforts)
+        if start is not None:
+            results[2][:], stages = start, stages | STARTED
         return int(run(
             evaluate, *self.packed, self.home,
-            self.at_home if warm or not stages & KEPT else NOWHERE, np.array(first),
+            self.at_home if warm or not stages & KEPT else NOWHERE,
+            np.array(self.home if nearby is None else nearby),
             self._no_motion if given is None else given, rows,
             *(bodies or (self._no_bodies, NO_GRAVITY)),
             np.empty((len(rows), self._lengths[1])) if loads is None else loads,
-            *(results or (np.array(NO_FRICTION), self.no_actuators,
-                          np.empty((len(rows), len(self.home))), self._no_efforts)), stages, warm))
+            *results, stages, warm))

@@ -32,12 +32,18 @@ from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, Dri
 from pprs_dynamics.physics.effects.laws.joint_friction import (
     IndependentChainsFriction,
     ModelJointFriction,
+    PrintedFriction,
 )
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism import tree_equations as rows
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.state import MECHANISM, MechanismState, Motion, Reversal
+from pprs_dynamics.physics.mechanism.state import (
+    MECHANISM,
+    MechanismState,
+    Motion,
+    Reversal,
+)
 from pprs_dynamics.physics.model.forces import RIGID_BODY, DriveLimits, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
     EFFORT_UNITS,
@@ -153,20 +159,20 @@ class DriveModel:
         """Names of the drives."""
         return self.robot.drives
 
-    @property
-    def moves_joints(self) -> bool:
-        """Whether it is commanded by the motion of its joints; else by that of a platform."""
-        return JointMotion in self.robot.motions
-
     @cached_property
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
         return keys_of(self.values)
 
     @property
-    def is_mechanism(self) -> bool:
-        """Whether it is neither a 3-PPRS nor a single slide."""
+    def has_bodies(self) -> bool:
+        """Whether `pprs fit` identifies its bodies by regression; a slide has one inertia alone."""
         return self.kind == MECHANISM
+
+    @property
+    def has_links(self) -> bool:
+        """Whether its file may have numbers of links and friction as `pprs fit` writes them."""
+        return 'links.mass' in self.keys
 
     @property
     def units(self) -> tuple[DriveUnits, ...]:
@@ -201,12 +207,12 @@ class DriveModel:
         A described joint has a gear that holds any torque at rest. The speed is the file's own, not
         that of a fit: which samples count must not change with the widths that are fitted to them.
         """
-        return float(self.values['friction.reversal_velocity']) if self.is_mechanism else 0.0
+        return float(self.values['friction.reversal_velocity']) if self.has_bodies else 0.0
 
     @property
     def blocks_per_period(self) -> float:
         """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
-        return BLOCKS_PER_PERIOD if self.is_mechanism else 0.0
+        return BLOCKS_PER_PERIOD if self.has_bodies else 0.0
 
     @property
     def friction(self) -> DriveFriction:
@@ -294,12 +300,6 @@ class DriveModel:
                      if isinstance(effect, ModelJointFriction)),
                     self.robot.friction_table({}, self.reversal))
 
-    def at_drives(self, state: MechanismState) -> MechanismState:
-        """Return the state in which the links follow drives that move as in another."""
-        motion = self.robot.motion_of_drives(
-            state.position, state.velocity, state.acceleration).with_channels(state.channels)
-        return self.mechanism(motion if state.time is None else motion.with_time(state.time))
-
     def drive_forces(self, motion: Motion, state: ModelState | None = None) -> Forces:
         """Return the forces that the drives must apply for a motion.
 
@@ -324,8 +324,7 @@ class DriveModel:
         """
         self._require_motion(motion)
         parameters, closed = self._own_parameters, None if state is None else state.closed
-        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed,
-                                                                    bool(self._added))
+        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed)
         if found is None:
             # No pass, or a sample out of reach or near a singularity: every sample is checked.
             # Very large numbers overflow; users of the result check that it is finite.
@@ -349,7 +348,7 @@ class DriveModel:
     def _own_parameters(self) -> Any:
         """Parameters of the pass over bodies and own friction, None where there is none.
 
-        Effects that change the bodies, and the second approach to friction, Eq. (13), have none.
+        Effects that change the bodies have none, nor have Eq. (13), and Eq. (12) as printed.
         """
         drives = np.zeros((rows.OF_DRIVE, len(self.drives)))
         drives[rows.ARMATURE], drives[rows.WIDTH] = self.robot.armature, self.reversal.velocity
@@ -359,7 +358,7 @@ class DriveModel:
                 drives[rows.COEFFICIENT] = effect.coefficient
             elif isinstance(effect, DriveOffset):
                 drives[rows.OFFSET] = effect.value
-            elif isinstance(effect, BodyEffect | IndependentChainsFriction):
+            elif isinstance(effect, BodyEffect | IndependentChainsFriction | PrintedFriction):
                 return None
         return self.robot.friction_parameters(self._joint_friction, drives)
 

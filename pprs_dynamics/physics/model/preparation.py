@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-import numpy as np
-
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 
@@ -31,8 +30,7 @@ def prepare(model: DriveModel) -> None:
         model = model.sound_at(home)
         forces = model.drive_forces(home)
         model.drive_forces(home[:1])
-        position = forces.drive_motion[0]
-        model.robot.motion_of_drives(position, np.zeros_like(position), np.zeros_like(position))
+        model.drive_forces(JointMotion(*forces.drive_motion))
         for effect in model.effects:
             effect.force(forces.mechanism, effect.initial_memory())
 

@@ -19,6 +19,7 @@ from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction
 from pprs_dynamics.physics.effects.laws.joint_friction import (
     IndependentChainsFriction,
     ModelJointFriction,
+    PrintedFriction,
 )
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.mechanism.state import MechanismState
@@ -99,7 +100,8 @@ def reproduce(model: DriveModel) -> Reproduction:
     active = model.friction.force(mechanism)
     blocks = next(effect.blocks for effect in model.effects
                   if isinstance(effect, ModelJointFriction))
-    approaches = (ModelJointFriction(blocks),
+    whole = PrintedFriction if model.robot.printed else ModelJointFriction
+    approaches = (whole(blocks),
                   IndependentChainsFriction(blocks, model.values['limits.rod_cosine']))
     passive = {approach: _where_defined(effect, mechanism)
                for approach, effect in zip(APPROACHES, approaches, strict=True)}
@@ -107,7 +109,7 @@ def reproduce(model: DriveModel) -> Reproduction:
         model.reversal, velocity=HARD_REVERSAL, rate=HARD_REVERSAL))
     hard = hard_model.mechanism(path.motion(time))
     return Reproduction(
-        time, mechanism.rigid_force, active, passive, mechanism.links.rod_angle,
+        time, mechanism.rigid_force, active, passive, model.robot.rods(mechanism.links)[0],
         tuple(_claims(hard, model.friction, approaches)))
 
 
@@ -119,7 +121,8 @@ def _claims(
     first, second = (_where_defined(effect, state) for effect in approaches)
     friction = active + first
     share = 100 * _rms(friction) / _rms(Q + friction)
-    cos_u, u = state.links.cos_u, np.degrees(state.links.rod_angle)
+    u, *_ = state.robot.rods(state.links)
+    cos_u, u = np.cos(u), np.degrees(u)
     # A rod that leans down has a negative angle; upright is 90 degrees either way.
     crossed = bool(np.any(cos_u.min(axis=0) * cos_u.max(axis=0) < 0))
     near = float(np.nanmax(np.abs(_where_defined(

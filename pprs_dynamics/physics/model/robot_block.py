@@ -20,6 +20,7 @@ from pprs_dynamics.physics.effects.laws.drive_friction import DriveFriction, Dri
 from pprs_dynamics.physics.effects.laws.joint_friction import (
     IndependentChainsFriction,
     ModelJointFriction,
+    PrintedFriction,
 )
 from pprs_dynamics.physics.mechanism.description import (
     REVOLUTE,
@@ -70,8 +71,9 @@ def read_platform(values: Mapping[str, Any],
                       'radius': values[f'friction.{joint}.diameter'] / 2}
               for joint in (REVOLUTE, three_pprs.SPHERICAL)}
     is_independent = values['friction.approach'] == 'independent_chains'
+    is_printed = values['equations'] == 'printed'
     passive = (IndependentChainsFriction(blocks, values['limits.rod_cosine']) if is_independent
-               else ModelJointFriction(blocks))
+               else PrintedFriction(blocks) if is_printed else ModelJointFriction(blocks))
     lower, upper = zip(*(values[key] for key in STROKES), strict=True)
     robot = three_pprs.ThreePprs.of(
         Geometry(**below(values, 'geometry.')), Masses(**below(values, 'masses.')),
@@ -80,7 +82,7 @@ def read_platform(values: Mapping[str, Any],
         bounds=three_pprs.SingularityBounds(
             values['limits.rod_sine'], values['limits.condition_number'],
             values['limits.rod_cosine'] if is_independent else 0.0),
-        printed=values['equations'] == 'printed')
+        printed=is_printed)
     drives = DriveFriction(values['friction.drives.viscous'], 0.0,
                            values['friction.drives.coulomb'])
     return (robot, (drives, passive),

@@ -63,7 +63,7 @@ class Skeleton:
     @classmethod
     def of(cls, model: DriveModel, motion: PlatformMotion | JointMotion) -> Skeleton:
         """Return the poses of a motion of a model."""
-        return _of_links(model.robot.tree_motion(model.mechanism(motion)))
+        return _of_links(model.mechanism(motion).links)
 
 
 def _of_links(links: LinkMotion) -> Skeleton:

@@ -15,18 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from math import tanh
+from math import atan2, tanh
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple
-
-import numpy as np
 
 from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.evaluation import reader_of
 from pprs_dynamics.physics.mechanism.tree_equations import (
     DRIVE_FRICTION,
+    EFFORTS,
     JOINT_EFFORT,
+    LOAD,
     RIGID,
     TOTAL,
+    TRANSMITTED,
 )
 from pprs_dynamics.physics.mechanism.vectors import (
     MotionSample,
@@ -43,15 +44,13 @@ from pprs_dynamics.physics.mechanism.vectors import (
     times,
     turned,
     turned_back,
-    vector,
 )
 
 CHAINS = 3
-# Tables of results, (N, 6) each: TOTAL, RIGID, DRIVE_FRICTION and JOINT_EFFORT; the drives' motion
-# and guide loads; of the chains cosine and sine of u, its rates, k_r and k_s; the six rows of [J].
-POSITION, VELOCITY, ACCELERATION, GUIDE_LOAD = 4, 5, 6, 7
-ANGLE, RATE, RESISTANCE, JACOBIAN, EVERYTHING = 8, 9, 10, 11, 17
-NO_LOAD = np.zeros((1, 9))
+# Tables of results, (N, 6) each: efforts as of every mechanism, and the drives' motion.
+POSITION, VELOCITY, ACCELERATION, RESULTS = EFFORTS, EFFORTS + 1, EFFORTS + 2, EFFORTS + 3
+# First of three coordinates of the tree each: slides, place of o, yaw pitch roll, lifts, u_i.
+SLIDES, PLACE, TURNS, LIFTS, RODS, COORDINATES = 0, 3, 6, 9, 12, 15
 
 Ts = TypeVarTuple('Ts')
 T = TypeVar('T')
@@ -91,21 +90,18 @@ class Chain(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and radius [m].
+    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, and mu times radius [m].
 
-    It turns over within `width` [rad/s]; `printed` is 1 for Eq. (12) to the letter, else 0.
+    It turns over within `width` [rad/s].
     """
 
     width: Value
-    printed: Value
     c_r: Value = 0.0
     M_r: Value = 0.0
-    mu_r: Value = 0.0
-    r_r: Value = 0.0
+    lever_r: Value = 0.0
     c_s: Value = 0.0
     M_s: Value = 0.0
-    mu_s: Value = 0.0
-    r_s: Value = 0.0
+    lever_s: Value = 0.0
 
 
 class DriveParameters(NamedTuple):
@@ -120,8 +116,8 @@ class Parameters(NamedTuple):
     """Parameters of `forces`.
 
     R, l and r [m], the sign of sin u_i, mass, centre and inertia of the platform with its payload,
-    in `platform`, gravity in `base` [m/s^2]. `printed` is 1 for Eq. (7) to the letter, else 0;
-    `bound` is the square of the largest condition number, `drives` six of `DriveParameters`.
+    in `platform`, gravity in `base` [m/s^2]. `bound` is the square of the largest condition number,
+    `drives` six of `DriveParameters`.
     """
 
     R: Value
@@ -134,7 +130,6 @@ class Parameters(NamedTuple):
     moments: Vector
     products: Vector
     gravity: Vector
-    printed: Value
     minimum_sine: Any
     bound: Any
     joints: Joints
@@ -142,11 +137,11 @@ class Parameters(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Motions, loads and results of samples; see `forces`."""
+    """Motions and results of samples; see `forces`."""
 
     motion: Any
-    load: Any
     parts: Any
+    q: Any
 
 
 class Wrench(NamedTuple):
@@ -198,15 +193,14 @@ class ChainForces(NamedTuple):
 
 ThreeChains = tuple[ChainMotion, ChainMotion, ChainMotion]
 ThreeTwists = tuple[Twist, Twist, Twist]
-_V, _DRIVE = Vector(0.0, 0.0, 0.0), DriveParameters(0.0, 0.0, 1.0)
-FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES = Joints(1.0, 0.0), (_DRIVE,) * 6
+_V, _DRIVES = Vector(0.0, 0.0, 0.0), (DriveParameters(0.0, 0.0, 1.0),) * 6
 read_parameters = reader_of(Parameters(
-    0.0, 0.0, 0.0, 0.0, (Chain(*(0.0,) * 10),) * 3, 0.0, _V, _V, _V, _V, 0.0, 0.0, 0.0,
-    FRICTIONLESS_JOINTS, FRICTIONLESS_DRIVES))
+    0.0, 0.0, 0.0, 0.0, (Chain(*(0.0,) * 10),) * 3, 0.0, _V, _V, _V, _V, 0.0, 0.0, Joints(1.0),
+    _DRIVES))
 
 
-def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
-    """Fill tables of results from one of motions, and one of loads or a single load for all.
+def forces(parameters: Any, motion: Any, parts: Any, q: Any) -> int:
+    """Fill tables of results from one of motions.
 
     Parameters
     ----------
@@ -214,32 +208,32 @@ def forces(parameters: Any, motion: Any, load: Any, parts: Any) -> int:
         `row_of` a `Parameters`.
     motion : (N, 19) array
         See `PlatformMotion.rows`.
-    load : (N, 9) or (1, 9) array
-        Wrench of the platform, and moments in the hinges.
-    parts : (EVERYTHING, N, 6) or (GUIDE_LOAD, N, 6) array
+    parts : (RESULTS, N, 6) array
+    q : (N, COORDINATES) or (0, COORDINATES) array
 
     Returns
     -------
     int
         The first sample out of reach or too near a singularity, or -1.
     """
-    p, t = read_parameters(parameters), elements(Data(motion, load, parts))
+    p, t = read_parameters(parameters), elements(Data(motion, parts, q))
     first = -1
     for s in range(len(motion)):
-        if not _is_regular(p, s, t.motion, t.load, t.parts) and first < 0:
+        if not _is_regular(p, s, t.motion, t.parts) and first < 0:
             first = s
+        if len(t.q):
+            _write_coordinates(p, s, t.motion, t.q)
     return first
 
 
-def _is_regular(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> Any:
+def _is_regular(p: Parameters, s: int, motion: Any, parts: Any) -> Any:
     """Fill in sample s and return whether it is within reach and far from a singularity."""
     m = motion_sample(motion, s)
     chains = chain_motions(p, m)
     slides, lifts = invert(p, chains)
-    at = s if len(load) > 1 else 0
     # Step 1: the rods about C_i. Step 2: the platform. [B]^-1 says which reaction answers to what.
-    W = rod_reactions(p, chains, vector(load, at, 6))
-    wrench = platform_wrench(p, m, chains, W, vector(load, at, 0), vector(load, at, 3))
+    W = rod_reactions(p, chains)
+    wrench = platform_wrench(p, m, chains, W)
     bodies = chain_forces(p, chains, W, wrench, slides, lifts)
     k = joint_resistances(p, chains, bodies, m.omega)
     r1, r2, r3 = resisting_wrenches(p, chains, k, m.omega)
@@ -254,14 +248,21 @@ def _is_regular(p: Parameters, s: int, motion: Any, load: Any, parts: Any) -> An
         _write(parts, POSITION, s, i, c.slide, c.lift)
         _write(parts, VELOCITY, s, i, c.slide_velocity, c.lift_velocity)
         _write(parts, ACCELERATION, s, i, c.slide_acceleration, c.lift_acceleration)
-        if len(parts) > GUIDE_LOAD:
-            _write(parts, GUIDE_LOAD, s, i, f.slide_load, f.lift_load)
-            _write(parts, ANGLE, s, i, c.cos_u, c.sin_u)
-            _write(parts, RATE, s, i, c.u_dot, c.u_ddot)
-            _write(parts, RESISTANCE, s, i, k[i][0], k[i][1])
-            _write_twist(parts, s, i, 1.0, slides[i])
-            _write_twist(parts, s, CHAINS + i, c.sin_u, lifts[i])
     return is_within_bounds(p, chains, slides, lifts)
+
+
+def _write_coordinates(p: Parameters, s: int, motion: Any, q: Any) -> None:
+    """Write the coordinates of the tree."""
+    m = motion_sample(motion, s)
+    chains, (x, y, z) = chain_motions(p, m), m.rotation
+    for i in range(CHAINS):
+        c = chains[i]
+        q[s, SLIDES + i], q[s, LIFTS + i] = c.slide, c.lift
+        q[s, RODS + i] = atan2(c.sin_u, c.cos_u)
+    q[s, PLACE], q[s, PLACE + 1], q[s, PLACE + 2] = m.position
+    q[s, TURNS] = atan2(x.y, x.x)
+    q[s, TURNS + 1] = atan2(-x.z, sqrt(y.z * y.z + z.z * z.z))
+    q[s, TURNS + 2] = atan2(y.z, z.z)
 
 
 def _write_forces(p: Parameters, parts: Any, s: int, drive: int, rigid_body: Any, velocity: Any,
@@ -270,21 +271,14 @@ def _write_forces(p: Parameters, parts: Any, s: int, drive: int, rigid_body: Any
     c, mu, width = p.drives[drive]
     active = c * velocity + mu * load * tanh(velocity / width)                 # Eq. (15), (16)
     parts[TOTAL, s, drive] = rigid_body + active + passive                     # Eq. (14)
-    parts[RIGID, s, drive], parts[DRIVE_FRICTION, s, drive] = rigid_body, active
+    parts[RIGID, s, drive] = parts[TRANSMITTED, s, drive] = rigid_body
+    parts[DRIVE_FRICTION, s, drive], parts[LOAD, s, drive] = active, load
     parts[JOINT_EFFORT, s, drive] = passive
 
 
 def _write(parts: Any, row: int, s: int, i: int, first: Any, second: Any) -> None:
     """Write two numbers of chain i."""
     parts[row, s, i], parts[row, s, CHAINS + i] = first, second
-
-
-def _write_twist(parts: Any, s: int, drive: int, A: Any, twist: Twist) -> None:
-    """Write a column of [J] = [B]^-1 [A], Eq. (11)."""
-    v, omega = twist
-    parts[JACOBIAN, s, drive], parts[JACOBIAN + 3, s, drive] = A * v.x, A * omega.x
-    parts[JACOBIAN + 1, s, drive], parts[JACOBIAN + 4, s, drive] = A * v.y, A * omega.y
-    parts[JACOBIAN + 2, s, drive], parts[JACOBIAN + 5, s, drive] = A * v.z, A * omega.z
 
 
 # --- kinematics ----------------------------------------------------------------------------------
@@ -434,32 +428,30 @@ def _square(twist: Twist, r: Any) -> Any:
 
 
 @each_chain
-def rod_reactions(i: int, p: Parameters, chains: ThreeChains, hinges: Any) -> Any:
-    """Return W_i, from the moments about C_i of the rod and of the hinge."""
+def rod_reactions(i: int, p: Parameters, chains: ThreeChains) -> Any:
+    """Return W_i, from the moments about C_i of the rod."""
     k, c = p.chains[i], chains[i]
     f_e, f_k = -radial(k, p.gravity), c.lift_acceleration - p.gravity.z
     return (k.rod * (c.cos_u * f_k + c.sin_u * f_e) / 2.0
-            + k.rod * p.l * c.u_ddot / 3.0 + hinges[i] / p.l)                  # Eq. (5)
+            + k.rod * p.l * c.u_ddot / 3.0)                                    # Eq. (5)
 
 
-def platform_wrench(p: Parameters, m: MotionSample, chains: ThreeChains, W: Any, force: Vector,
-                    moment: Vector) -> Wrench:
+def platform_wrench(p: Parameters, m: MotionSample, chains: ThreeChains, W: Any) -> Wrench:
     """Return the wrench about o that H_i and V_i apply, in `base` [N, N m].
 
-    Left side of Eq. (6) minus weight and W_i, with the centre of mass anywhere, and with a wrench
-    that the platform applies to the world. With d, the vector from o to the centre:
+    Left side of Eq. (6) minus weight and W_i, with the centre of mass anywhere. With d, the vector
+    from o to the centre:
 
         force = (M + m)(a_o + eps x d + omega x (omega x d) - g)
         moment = [I]eps + omega x [I]omega + d x force
     """
     d = turned(m.rotation, p.centre)
     a_centre = plus(m.a, plus(product(m.epsilon, d), product(m.omega, product(m.omega, d))))
-    F = times(p.mass, minus(a_centre, p.gravity))                              # Eq. (6)
+    force = times(p.mass, minus(a_centre, p.gravity))                          # Eq. (6)
     # In `platform`, where [I] is constant.
     omega, epsilon = turned_back(m.rotation, m.omega), turned_back(m.rotation, m.epsilon)
     spin = plus(_momentum(p, epsilon), product(omega, _momentum(p, omega)))
-    M = plus(turned(m.rotation, spin), product(d, F))                          # Eq. (6)
-    force, moment = plus(F, force), plus(M, moment)
+    moment = plus(turned(m.rotation, spin), product(d, force))                 # Eq. (6)
     for i in range(CHAINS):
         c = chains[i]
         rod = at_platform(c.arm, in_base(p.chains[i], -c.sin_u, 0.0, -c.cos_u))
@@ -496,10 +488,8 @@ def chain_forces(i: int, p: Parameters, chains: ThreeChains, W: Any, wrench: Wre
     V_star = V * c.sin_u - W[i] * c.cos_u + k.rod * rise + k.rod * f_k         # Eq. (9)
     W_star = V * c.cos_u + W[i] * c.sin_u - k.rod * lean - k.rod * f_e         # Eq. (9)
 
-    # Steps 3 and 4: the chain down to the lift, then down to the slide. Printed, the rod's
-    # term in Eq. (7) lacks the factor l.
-    printed_rise = rise * (1.0 + p.printed * (1.0 / l - 1.0))
-    Q_lift = ((k.lift + k.rod) * f_k + k.rod * printed_rise + V * c.sin_u
+    # Steps 3 and 4: the chain down to the lift, then down to the slide.
+    Q_lift = ((k.lift + k.rod) * f_k + k.rod * rise + V * c.sin_u
               - W[i] * c.cos_u)                                                # Eq. (7)
     Q_slide = (k.slide + k.lift + k.rod) * f_n + H                             # Eq. (8)
 
@@ -529,8 +519,8 @@ def joint_resistances(i: int, p: Parameters, chains: ThreeChains, bodies: Any, o
     """Return k_ri and k_si, friction over speed in C_i and A_i [N m s/rad]."""
     j, c, f = p.joints, chains[i], bodies[i]
     rate = relative_rate(p.chains[i], c.u_dot, omega)
-    dry_r = j.M_r + j.mu_r * j.r_r * f.revolute_load                           # Eq. (1)
-    dry_s = j.M_s + j.mu_s * j.r_s * f.spherical_load                          # Eq. (1)
+    dry_r = j.M_r + j.lever_r * f.revolute_load                                # Eq. (1)
+    dry_s = j.M_s + j.lever_s * f.spherical_load                               # Eq. (1)
     return (j.c_r + dry_r * sign_over_speed(abs(c.u_dot), j.width),            # Eq. (2), (9)
             j.c_s + dry_s * sign_over_speed(sqrt(dot(rate, rate)), j.width))   # Eq. (2), (9)
 
@@ -543,13 +533,12 @@ def resisting_wrenches(i: int, p: Parameters, chains: ThreeChains, k: Any, omega
 
     Notes
     -----
-    The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. The printed
-    form gives the same total power and another share per drive.
+    The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. For the printed
+    form see `PrintedFriction`.
     """
-    c, chain, printed = chains[i], p.chains[i], p.joints.printed
+    c, chain = chains[i], p.chains[i]
     k_r, k_s = k[i]
-    about_u = ((k_r + k_s) * c.u_dot
-               - (1.0 + printed) * k_s * along_axis(chain, omega))             # Eq. (12)
-    against = relative_rate(chain, (1.0 - printed) * c.u_dot, omega)
+    about_u = (k_r + k_s) * c.u_dot - k_s * along_axis(chain, omega)           # Eq. (12)
+    against = relative_rate(chain, c.u_dot, omega)
     rod = at_platform(c.arm, in_base(chain, about_u / (p.l * c.sin_u), 0.0, 0.0))  # Eq. (10)
     return Wrench(rod.force, minus(rod.moment, times(k_s, against)))           # Eq. (12)

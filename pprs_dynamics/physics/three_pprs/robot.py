@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
-from pprs_dynamics.errors import ConvergenceError, ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import (
     FLOATING,
@@ -31,25 +31,27 @@ from pprs_dynamics.physics.mechanism.description import (
     body_at,
 )
 from pprs_dynamics.physics.mechanism.evaluation import row_of, run
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion, checked_matrix
+from pprs_dynamics.physics.mechanism.motion import WIDTHS, PlatformMotion
 from pprs_dynamics.physics.mechanism.state import (
     PLATFORM,
     BodyPlace,
     MechanismState,
     PassiveJoint,
-    Reversal,
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
+from pprs_dynamics.physics.mechanism.tree_equations import Integers, JointFriction
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.three_pprs import closed_form
-from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS_JOINTS, Joints
 
 HOME_HEIGHT = 0.5  # [m], of the platform at home
 SPHERICAL = 'spherical'  # the joints A_i; C_i are REVOLUTE
 HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in (1, 2, 3)) for part in ('hinge', 'ball', 'rod'))
+PLACE, TURNS = np.s_[3:6], np.s_[6:9]  # in coordinates, see `closed_form`
+NOT_WANTED = np.empty((0, closed_form.COORDINATES))
 LINKS = (*DRIVES, *RODS, PLATFORM)  # that move, in the order of `ThreePprs.inertial`
 OF_RODS = np.s_[6:9]  # in `LINKS`
 ALIKE = {REVOLUTE: HINGES, SPHERICAL: BALLS}  # of the tree
@@ -232,133 +234,6 @@ class SingularityBounds(NamedTuple):
 UNBOUNDED = SingularityBounds()
 
 
-class ClosedForm:
-    """Kinematics, reactions and forces of a 3-PPRS at N samples, without friction of the drives.
-
-    Parameters
-    ----------
-    robot : ThreePprs
-    motion : PlatformMotion
-    load : StructureLoad, optional
-        In addition to bodies and gravity.
-    joints : Joints
-        Friction of the passive joints.
-    table : (EVERYTHING, N, 6) array, optional
-        The results, where they are known.
-    """
-
-    def __init__(self, robot: ThreePprs, motion: PlatformMotion,
-                 load: StructureLoad | None = None, joints: Joints = FRICTIONLESS_JOINTS,
-                 table: Array | None = None) -> None:
-        self.robot, self.motion, self.load, self.joints = robot, motion, load, joints
-        self.is_regular = True
-        if table is None:
-            loads = closed_form.NO_LOAD
-            if load is not None:
-                loads = np.zeros((len(motion), 9))
-                loads[:, :6] = load.wrench
-                loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
-            table = np.empty((closed_form.EVERYTHING, len(motion), 6))
-            self.is_regular = run(closed_form.forces, robot.friction_parameters(joints),
-                                  motion.rows, loads, table) < 0
-        self.table = table
-        self.position, self.velocity, self.acceleration = (
-            table[closed_form.POSITION:closed_form.ACCELERATION + 1])
-        self.efforts, self.guide_load = table[tree.RIGID], table[closed_form.GUIDE_LOAD]
-        self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
-        self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
-
-    @property
-    def rod_angle(self) -> Array:
-        """u_i [rad], (N, 3)."""
-        angle: Array = np.arctan2(self.sin_u, self.cos_u)
-        return angle
-
-    @property
-    def J(self) -> Array:
-        """[J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
-        return self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
-
-    @property
-    def tool_velocity(self) -> Array:
-        """Velocity of o and angular velocity of the platform, in `base`, (N, 6)."""
-        return self.motion.rows[:, 7:13]
-
-    def joint_position(self, joint: str) -> Array:
-        """Return the angles u_i of the joints C_i, (N, 3) [rad]."""
-        assert joint == REVOLUTE
-        return self.rod_angle
-
-    def resistances(self, joints: Joints) -> Sequence[Array]:
-        """Return k_ri and k_si at the frictionless reactions, (N, 3) each, Eq. (9)."""
-        return np.split(self._with(joints).table[closed_form.RESISTANCE], 2, axis=1)
-
-    def friction(self, loads: ClosedForm, joints: Joints) -> Array:
-        """Return the drive forces against friction of passive joints, (N, 6) [N].
-
-        By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
-        """
-        found: Array = loads._with(joints).table[tree.JOINT_EFFORT]
-        return found
-
-    def _with(self, joints: Joints) -> ClosedForm:
-        return self if joints == self.joints else ClosedForm(
-            self.robot, self.motion, self.load, joints)
-
-    def require_regular(self) -> None:
-        """Raise an error for poses out of reach, or nearer to a singularity than allowed.
-
-        Raises
-        ------
-        WorkspaceError
-            Where a rod is too short to reach: abs(R - A_i . e_i) > l.
-        SingularityError
-            Where a rod lies horizontally, the drives cannot hold the platform, or the drive
-            Jacobian is conditioned poorly.
-        """
-        geometry, bounds = self.robot.geometry, self.robot.bounds
-        beyond = ~(np.abs(self.cos_u) <= 1.0)
-        if np.any(beyond):
-            sample, chain = (int(i) for i in np.argwhere(beyond)[0])
-            raise WorkspaceError(
-                sample, f'the rod of chain {chain + 1} would have to span '
-                f'{abs(self.cos_u[sample, chain]) * geometry.rod_length:.6g} m radially',
-                f'its length is geometry.rod_length = {geometry.rod_length:g} m')
-        flat = np.abs(self.sin_u) < bounds.rod_sine
-        if np.any(flat):
-            sample, chain = (int(i) for i in np.argwhere(flat)[0])
-            raise SingularityError(
-                sample, f'|sin u| of chain {chain + 1} is {abs(self.sin_u[sample, chain]):.3g} '
-                '(its rod lies horizontally)',
-                f'it must be at least {bounds.rod_sine:g} (limits.rod_sine)')
-        singular = ~np.isfinite(self.J).all(axis=(1, 2))
-        if np.any(singular):
-            raise SingularityError(int(np.argmax(singular)), 'det [B] is 0',
-                                   'the drives cannot hold the platform here')
-        number = condition_number(geometry, self.J)
-        over = ~(number <= bounds.condition_number)
-        if np.any(over):
-            worst = int(np.argmax(over))
-            raise SingularityError(
-                worst, f'the condition number of the drive Jacobian is {number[worst]:.4g}',
-                f'limits.condition_number is {bounds.condition_number:g}')
-
-
-def condition_number(geometry: Geometry, J: Array) -> Array:
-    """Return the condition number of the drive Jacobian, (N,).
-
-    Rotations are multiplied by the platform's radius r as characteristic length, so that both
-    halves of a twist are in m/s.
-
-    References
-    ----------
-    J. Angeles, Fundamentals of Robotic Mechanical Systems, on the characteristic length.
-    """
-    r = geometry.platform_radius
-    number: Array = np.linalg.cond(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None])
-    return number
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ThreePprs(Mechanism):
     """The 3-PPRS: a mechanism that the paper's closed form evaluates.
@@ -375,7 +250,8 @@ class ThreePprs(Mechanism):
     bounds: SingularityBounds = UNBOUNDED
     printed: bool = False
 
-    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
+    has_guides: ClassVar[bool] = True
+    plans_poses: ClassVar[bool] = True
     kind: ClassVar[str] = PLATFORM
     # Joints and links are three of a kind; no two kinds are alike.
     alike_joints: ClassVar[tuple[tuple[str, ...], ...]] = ()
@@ -399,7 +275,7 @@ class ThreePprs(Mechanism):
             structure.links[name][0] for name in LINKS]), inertial=inertial,
             armature=np.zeros(COUNT), gravity=gravity, geometry=geometry, **more)
 
-    @property
+    @cached_property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
         """The joints C_i, and the joints A_i."""
         return tuple(PassiveJoint(name, self.radii.get(name, 0.0), has_position=name == REVOLUTE,
@@ -414,16 +290,6 @@ class ThreePprs(Mechanism):
     def position_step(self) -> float:
         """Step of a drive for derivatives by its position [m]."""
         return POSITION_STEP * self.geometry.rod_length
-
-    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       is_own: bool = False) -> Joints:
-        """Return friction of joints as `MechanismState.friction_efforts` takes it.
-
-        Only the model's own may be printed.
-        """
-        return Joints(reversal.rate, float(is_own and self.printed), *(
-            blocks.get(joint, {}).get(key, 0.0) for joint in (REVOLUTE, SPHERICAL)
-            for key in ('viscous', 'torque', 'coulomb', 'radius')))
 
     def heavier(self, link: str, mass: float) -> Self:
         """Return the robot with a payload, or with rods, that weigh more [kg]."""
@@ -447,90 +313,52 @@ class ThreePprs(Mechanism):
         constants = np.stack((cos, sin, joints.real, joints.imag, *left, balance, *masses), axis=1)
         return tuple(closed_form.Chain(*chain) for chain in constants.tolist())
 
-    def friction_parameters(self, joints: Joints, drives: Array | None = None) -> Array:
-        """Return the parameters of `closed_form.forces`, for `one_pass`.
+    def friction_parameters(self, joints: JointFriction, drives: Array | None = None) -> Any:
+        """Return parameters for `one_pass`: first those of `closed_form.forces`.
 
         Parameters
         ----------
-        joints : Joints
+        joints : JointFriction
         drives : (OF_DRIVE, 6) array, optional
             Without it the drives have no friction.
         """
         geometry, bounds = self.geometry, self.bounds
         mass, centre, inertia = about_centre(self.inertial[-1])
-        friction = closed_form.FRICTIONLESS_DRIVES if drives is None else tuple(
-            closed_form.DriveParameters(*drive)
-            for drive in drives[[tree.VISCOUS, tree.COEFFICIENT, tree.WIDTH]].T.tolist())
+        tables = super().friction_parameters(joints, drives)
+        friction = tuple(closed_form.DriveParameters(*drive) for drive in tables[1][
+            [tree.VISCOUS, tree.COEFFICIENT, tree.WIDTH]].T.tolist())
         first, second, third = self._chains
-        return row_of(closed_form.Parameters(
+        width, *hinge = _of_three(joints, joints.joint)
+        width_of_ball, *ball = _of_three(joints, joints.loop)
+        own = row_of(closed_form.Parameters(
             geometry.base_radius, geometry.rod_length, geometry.platform_radius,
             geometry.elbow_sign, (first, second, third), mass, Vector(*centre),
             Vector(*np.diag(inertia)), Vector(inertia[0, 1], inertia[0, 2], inertia[1, 2]),
-            Vector(*self.gravity),
-            float(self.printed), bounds.rod_sine, bounds.condition_number ** 2, joints, friction))
+            Vector(*self.gravity), bounds.rod_sine, bounds.condition_number ** 2,
+            closed_form.Joints(width or width_of_ball or 1.0, *hinge, *ball), friction))
+        return own, *tables
 
-    def one_pass(self, motion: Any, parameters: Any, closed: object, has_state: bool = False,
-                 start: object = None) -> tree.InverseDynamicsResult | None:
+    def one_pass(self, motion: Any, parameters: Any, closed: dict[Any, Array] | None,
+                 start: Array | None = None) -> tree.InverseDynamicsResult | None:
         """Return the forces for a motion, friction included; see `Mechanism.one_pass`."""
-        # Memory is what limits long motions: the rows that only a state reads take 12 % longer.
-        size = closed_form.EVERYTHING if has_state else closed_form.GUIDE_LOAD
-        rows = motion.rows
-        table = np.empty((size, len(rows), 6))
-        if run(closed_form.forces, parameters, rows, closed_form.NO_LOAD, table) >= 0:
+        if self.printed:
             return None
-        return tree.InverseDynamicsResult(
-            None, table, table[closed_form.POSITION:closed_form.GUIDE_LOAD])
+        if not isinstance(motion, PlatformMotion):
+            found = super().one_pass(motion, parameters[1:], closed, start)
+            return found if found is not None and self._is_within_bounds(found.q) else None
+        table, failed = _closed_form(parameters[0], motion.rows, NOT_WANTED)
+        return None if failed >= 0 else tree.InverseDynamicsResult(
+            None, table, table[tree.EFFORTS:])
 
     # --- motion --------------------------------------------------------------------------------
-
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         closed: dict[Any, Array] | None = None) -> PlatformMotion:
-        """Return the platform's motion that belongs to a continuous motion of the drives.
-
-        Six drive positions belong to several poses. The closures of the tree are followed from the
-        home pose, or from the last sample, and only poses are accepted whose determinant has the
-        sign that it has at home.
-
-        Parameters
-        ----------
-        position, velocity, acceleration : (N, 6) arrays
-            q [m], q_dot [m/s], q_ddot [m/s^2] in drive order.
-        closed : dict of Structure to array, optional
-            Coordinates at the last sample of another motion, from which this one goes on; brought
-            up to date.
-
-        Raises
-        ------
-        MotionError
-            For a wrong shape or a non-finite number.
-        ConvergenceError
-            Where no pose of the home pose's assembly mode is found.
-        ModelError
-            Where the geometry's home pose is itself singular.
-        """
-        q = checked_matrix('drive positions', position, COUNT)
-        structure, closed = self.structure, {} if closed is None else closed
-        try:
-            links = LinkMotion.of(structure, q, np.asarray(velocity), np.asarray(acceleration),
-                                  nearby=closed.get(structure))
-        except WorkspaceError as error:
-            raise ConvergenceError(
-                error.sample, f'no pose found for drive positions {q[error.sample].tolist()} m',
-                'they must close the mechanism in the assembly mode of the home pose') from None
-        m, (row, _) = links.motion, structure.links[structure.tool]
-        closed[structure] = m.q[-1].copy()
-        return PlatformMotion(m.p[:, row], _orientation(*(m.q[:, structure.coordinates.index(
-            f'platform.{angle}')] for angle in ('yaw', 'pitch', 'roll'))),
-            m.u[:, row], m.w[:, row], m.ud[:, row], m.wd[:, row])
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
         return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
 
-    def state(self, motion: Any, reversal: Reversal, friction: Any = FRICTIONLESS_JOINTS,
-              closed: object = None,
-              found: tree.InverseDynamicsResult | None = None) -> MechanismState:
-        """Return the state for a platform motion; `found` as of `one_pass`.
+    def drive_motion(self, motion: PlatformMotion, closed: object = None,
+                     ) -> tuple[JointMotion, Array]:
+        """Return the motion of the drives for that of the platform, and closed coordinates.
 
         Raises
         ------
@@ -539,76 +367,184 @@ class ThreePprs(Mechanism):
         SingularityError
             For a pose nearer to a singularity than `bounds` allow.
         """
+        start = np.empty((len(motion), closed_form.COORDINATES))
         # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            table = None if found is None or len(found.efforts) < closed_form.EVERYTHING else (
-                found.efforts)
-            links = ClosedForm(self, motion, joints=friction, table=table)
-            if not links.is_regular:
-                links.require_regular()
-        return MechanismState(links.position, links.velocity, links.acceleration, motion.time,
-                              channels=motion.channels, robot=self, reversal=reversal,
-                              known=links, motion=motion, friction=friction)
+            table, failed = _closed_form(self._frictionless, motion.rows, start)
+            position, velocity, acceleration = table[tree.EFFORTS:]
+            moved = JointMotion(position, velocity, acceleration, motion.time)
+            start[:, PLACE] -= self.structure.poses[PLATFORM].p
+            if failed >= 0:
+                self._require_reach(motion)
+                self._require_regular(LinkMotion(
+                    self.structure, self.structure.evaluation.forward_kinematics(
+                        position, velocity, acceleration, start)[0]))
+        return moved, start
 
-    def remember(self, state: MechanismState, closed: object) -> None:
-        """Store nothing: poses have a closed form."""
+    def kinematics(self, state: MechanismState) -> LinkMotion:
+        """Return the motion of all links in a state within `bounds`.
 
-    def tree_motion(self, state: MechanismState) -> LinkMotion:
-        """Return where the links of the tree are in a state, at rest."""
-        still = np.zeros_like(state.position)
-        return self.at(state.position, still, still)
+        Closed coordinates from which to start, and one pass, are of poses within them.
+        """
+        links: LinkMotion = super().kinematics(state)
+        if state.start is None and vars(state).get('inverse_dynamics') is None and not (
+                self._is_within_bounds(links.motion.q)):
+            self._require_regular(links)
+        return links
 
-    def kinematics(self, state: MechanismState) -> ClosedForm:
-        """Return the kinematics of a state that lacks them."""
-        return ClosedForm(self, state.motion, joints=state.friction)
+    def platform_motion(self, links: LinkMotion) -> PlatformMotion:
+        """Return the motion of the platform, without times."""
+        m, row = links.motion, self.structure.links[PLATFORM][0]
+        rows = self._poses(m.q)
+        rows[:, 7:] = np.hstack((m.u[:, row], m.w[:, row], m.ud[:, row], m.wd[:, row]))
+        return PlatformMotion.from_rows(rows)
 
-    def loads(self, found: ClosedForm, load: StructureLoad | None) -> ClosedForm:
-        """Return frictionless drive forces and reactions."""
-        if load is found.load and self is found.robot:
-            return found
-        return ClosedForm(self, found.motion, load, found.joints)
+    def _poses(self, q: Array) -> Array:
+        """Return the poses of closed coordinates (N, C) at rest, as `PlatformMotion.rows`."""
+        (z, y, x), (c_z, c_y, c_x) = (turn(q[:, TURNS].T / 2) for turn in (np.sin, np.cos))
+        rows = np.zeros((len(q), sum(WIDTHS)))
+        rows[:, :3] = q[:, PLACE] + self.structure.poses[PLATFORM].p
+        rows[:, 3], rows[:, 4] = x * c_y * c_z - c_x * y * z, c_x * y * c_z + x * c_y * z
+        rows[:, 5], rows[:, 6] = c_x * c_y * z - x * y * c_z, c_x * c_y * c_z + x * y * z
+        return rows
+
+    @cached_property
+    def _frictionless(self) -> Array:
+        parameters: Array = self.friction_parameters(tree.NO_FRICTION)[0]
+        return parameters
 
     def under_loads(self, state: MechanismState, others: Sequence[MechanismState],
                     ) -> Iterator[MechanismState]:
-        """Yield states, which have a closed form."""
-        yield from others
+        """Yield states of the same motion; those of the printed form one by one."""
+        yield from others if self.printed else super().under_loads(state, others)
 
-    def inverse_dynamics(self, state: MechanismState) -> None:
-        """Return None: the model evaluates its one pass itself."""
+    def loads(self, links: LinkMotion, load: StructureLoad | None) -> tree.Loads:
+        """Return the frictionless loads of joints and closures.
 
-    def friction_load(self, state: MechanismState) -> Array:
-        """Return the normal forces on the guides [N], (N, 6)."""
-        load: Array = state.reactions.guide_load
-        return load
+        Printed, the rod's term in Eq. (7) lacks the factor l.
+        """
+        found: tree.Loads = super().loads(links, load)
+        if self.printed:
+            u, u_dot, u_ddot = self.rods(links)
+            rise = (u_ddot * np.cos(u) - u_dot ** 2 * np.sin(u)) / 2
+            found.efforts[:, COUNT // 2:] += (1 - self.geometry.rod_length) * (
+                self.masses[OF_RODS] * rise)                                   # Eq. (7)
+        return found
 
-    def load_of_friction(self, state: MechanismState, joints: Joints) -> StructureLoad:
+    # --- rods and passive joints ------------------------------------------------------------------
+
+    @cached_property
+    def _hinges(self) -> Integers:
+        """Rows of the joints C_i."""
+        return np.array([self.structure.rows[name] for name in HINGES])
+
+    def rods(self, links: LinkMotion) -> Array:
+        """Return u_i with its first and second rate, (3, N, 3) [rad]."""
+        found: Array = np.moveaxis(links.motion.motion[:, :, closed_form.RODS:], 1, 0)
+        return found
+
+    def jacobian(self, links: LinkMotion) -> Array:
+        """Return [J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
+        m, end = links.motion, self.structure.links[PLATFORM][0] + 1  # slides, then turns
+        rates = m.drive_to_joint[:, closed_form.PLACE:closed_form.LIFTS].reshape(-1, 2, 3, COUNT)
+        axes = m.z[:, end - COUNT:end].reshape(-1, 2, 3, 3)
+        J: Array = (axes.transpose(0, 1, 3, 2) @ rates).reshape(-1, COUNT, COUNT)
+        return J
+
+    def rod_rates(self, state: MechanismState) -> tuple[Array, Array]:
+        """Return n_i, and the rates u_dot_i n_i - omega of rods against the platform, (N, 3, 3)."""
+        n = state.links.motion.z[:, self._hinges]
+        return n, self.rods(state.links)[1][..., None] * n - state.tool_velocity[:, None, 3:]
+
+    def resistances(self, state: MechanismState, friction: JointFriction) -> tuple[Array, Array]:
+        """Return k_ri and k_si at the frictionless reactions, (N, 3) each, Eq. (9)."""
+        n, turning = self.rod_rates(state)
+        loads, found = state.reactions, []
+        for rows, rate, force in (
+                (friction.joint, self.rods(state.links)[1][..., None],
+                 np.cross(loads.f[:, self._hinges], n)),
+                (friction.loop, turning, loads.F)):
+            width, viscous, torque, lever = _of_three(friction, rows)
+            width = width or 1.0
+            speed = np.maximum(np.linalg.norm(rate, axis=2), 1e-8 * width)  # below it the limit
+            dry = torque + lever * np.linalg.norm(force, axis=2)               # Eq. (1)
+            found.append(viscous + dry * np.tanh(speed / width) / speed)       # Eq. (2)
+        return found[0], found[1]
+
+    def load_of_friction(self, state: MechanismState, joints: JointFriction) -> StructureLoad:
         """Return friction of passive joints as a load on the platform and the rods, Eq. (9).
 
         The paper takes the reactions for friction without it, so that friction does not follow.
         """
-        k_r, k_s = state.reactions.resistances(joints)
-        delta, u_dot = np.asarray(self.geometry.chain_angles), state.links.u_dot
-        axes = np.stack((-np.sin(delta), np.cos(delta), np.zeros(3)), axis=1)  # n_i
-        omega = state.tool_velocity[:, 3:]
-        moment = k_s.sum(axis=1)[:, None] * omega - (k_s * u_dot) @ axes
-        return StructureLoad(np.hstack((np.zeros_like(moment), moment)), {
-            REVOLUTE: k_r * u_dot + k_s * (u_dot - omega @ axes.T)})
-
-    def perturbed(self, state: MechanismState, position: Array, acceleration: Array,
-                  ) -> MechanismState:
-        """Return the state at other positions and accelerations of the drives."""
-        if position is state.position:
-            motion = state.motion.accelerated(np.einsum(
-                'nij,nj->ni', state.links.J, acceleration - state.acceleration))
-        else:
-            motion = self.motion_of_drives(position, state.velocity, acceleration)
-            motion = motion.with_channels(state.channels)
-            if state.time is not None:
-                motion = motion.with_time(state.time)
-        return replace(self.state(motion, state.reversal, state.friction),
-                       robot=state.robot, load=state.load)
+        k_r, k_s = self.resistances(state, joints)
+        n, turning = self.rod_rates(state)
+        moment = -np.sum(k_s[..., None] * turning, axis=1)
+        torques = k_r * self.rods(state.links)[1] + k_s * np.sum(turning * n, axis=2)
+        return StructureLoad(np.hstack((np.zeros_like(moment), moment)),
+                             dict(zip(HINGES, torques.T, strict=True)))
 
     # --- singularities ----------------------------------------------------------------------------
+
+    def _is_within_bounds(self, q: Array) -> bool:
+        """Return whether the closed form accepts the poses of closed coordinates, (N, C)."""
+        return bool(np.all(np.sin(q[:, closed_form.RODS:]) * self.geometry.elbow_sign > 0)
+                    and _closed_form(self._frictionless, self._poses(q), NOT_WANTED)[1] < 0)
+
+    def _require_reach(self, motion: PlatformMotion) -> None:
+        """Raise WorkspaceError where a rod is too short to reach: abs(R - A_i . e_i) > l."""
+        geometry, chains = self.geometry, np.array(self._chains)
+        arms = np.insert(chains[:, 2:4], 2, 0.0, axis=1)  # of A_i in `platform`
+        A = motion.position[:, None] + arms @ motion.rotation.transpose(0, 2, 1)
+        span = geometry.base_radius - np.sum(A[..., :2] * chains[:, :2], axis=2)
+        beyond = ~(np.abs(span) <= geometry.rod_length)
+        if np.any(beyond):
+            sample, chain = (int(i) for i in np.argwhere(beyond)[0])
+            raise WorkspaceError(
+                sample, f'the rod of chain {chain + 1} would have to span '
+                f'{abs(span[sample, chain]):.6g} m radially',
+                f'its length is geometry.rod_length = {geometry.rod_length:g} m')
+
+    def _require_regular(self, links: LinkMotion) -> None:
+        """Raise SingularityError for poses nearer to a singularity than allowed.
+
+        Where a rod lies horizontally, the drives cannot hold the platform, or the drive Jacobian
+        is conditioned poorly.
+        """
+        bounds = self.bounds
+        sine = np.sin(self.rods(links)[0]) * self.geometry.elbow_sign
+        flat = sine < bounds.rod_sine
+        if np.any(flat):
+            sample, chain = (int(i) for i in np.argwhere(flat)[0])
+            raise SingularityError(
+                sample, f'|sin u| of chain {chain + 1} is {abs(sine[sample, chain]):.3g} '
+                '(its rod lies horizontally)',
+                f'it must be at least {bounds.rod_sine:g} (limits.rod_sine)')
+        J = self.jacobian(links)
+        singular = ~np.isfinite(J).all(axis=(1, 2))
+        if np.any(singular):
+            raise SingularityError(int(np.argmax(singular)), 'det [B] is 0',
+                                   'the drives cannot hold the platform here')
+        number = self.condition_number(J)
+        over = ~(number <= bounds.condition_number)
+        if np.any(over):
+            worst = int(np.argmax(over))
+            raise SingularityError(
+                worst, f'the condition number of the drive Jacobian is {number[worst]:.4g}',
+                f'limits.condition_number is {bounds.condition_number:g}')
+
+    def condition_number(self, J: Array) -> Array:
+        """Return the condition number of the drive Jacobian, (N,).
+
+        Rotations are multiplied by the platform's radius r as characteristic length, so that both
+        halves of a twist are in m/s.
+
+        References
+        ----------
+        J. Angeles, Fundamentals of Robotic Mechanical Systems, on the characteristic length.
+        """
+        r = self.geometry.platform_radius
+        number: Array = np.linalg.cond(J * np.array([1.0, 1.0, 1.0, r, r, r])[:, None])
+        return number
 
     def singularity_margin(self, state: MechanismState) -> float:
         """Return 1 minus the largest of three shares, 0 at the limit.
@@ -616,24 +552,32 @@ class ThreePprs(Mechanism):
         Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
         with independent chains, the ratio for the cosine.
         """
-        bounds, found = self.bounds, state.links
-        number = condition_number(self.geometry, found.J[::-(-len(found.J) // MOST_CONDITIONS)])
-        return float(1 - max(number.max() / bounds.condition_number,
-                             bounds.rod_sine / np.abs(found.sin_u).min(),
-                             bounds.rod_cosine / np.abs(found.cos_u).min()))
+        bounds, (u, *_) = self.bounds, self.rods(state.links)
+        J = self.jacobian(state.links)[::-(-len(state) // MOST_CONDITIONS)]
+        return float(1 - max(self.condition_number(J).max() / bounds.condition_number,
+                             bounds.rod_sine / np.abs(np.sin(u)).min(),
+                             bounds.rod_cosine / np.abs(np.cos(u)).min()))
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""
-        motion = state.motion
-        x, y, z = motion.position.T
-        return {'load': state.friction_load, 'rod_angle': np.tile(state.links.rod_angle, 2),
+        platform = state.links.frame_of(PLATFORM)
+        (x, y, z), R = platform.p.T, platform.R
+        return {'load': state.friction_load, 'rod_angle': np.tile(self.rods(state.links)[0], 2),
                 'platform_x': x, 'platform_y': y, 'platform_z': z,
-                'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
+                'platform_tilt': np.arctan2(np.hypot(R[:, 0, 2], R[:, 1, 2]), R[:, 2, 2]),
+                'platform_turn': np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])}
 
 
-def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:
-    """Return the quaternions x, y, z, w of turns about z, then the new y, then the new x."""
-    (z, y, x), (c_z, c_y, c_x) = ([turn(angle / 2) for angle in (yaw, pitch, roll)]
-                                  for turn in (np.sin, np.cos))
-    return np.column_stack((x * c_y * c_z - c_x * y * z, c_x * y * c_z + x * c_y * z,
-                            c_x * c_y * z - x * y * c_z, c_x * c_y * c_z + x * y * z))
+def _closed_form(parameters: Array, motion: Array, q: Array) -> tuple[Array, int]:
+    """Return the results of `closed_form.forces`, and the first sample that it refuses or -1."""
+    table = np.empty((closed_form.RESULTS, len(motion), COUNT))
+    return table, run(closed_form.forces, parameters, motion, table, q)
+
+
+def _of_three(friction: JointFriction, rows: Any) -> tuple[float, ...]:
+    """Return width, viscous, torque and lever of three joints that are alike; 0 for none.
+
+    `rows` are those of friction: of joints, or of loops.
+    """
+    return tuple(float(column[rows >= 0][:1].sum()) for column in (
+        friction.width, friction.viscous, friction.torque, friction.lever))

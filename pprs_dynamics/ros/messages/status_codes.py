@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from pprs_dynamics.errors import (
-    ConvergenceError,
     EffectError,
     LimitError,
     MotionError,
@@ -40,7 +39,7 @@ CODES: tuple[str, ...] = (*REJECTIONS, *get_args(Condition))
 _KINDS: dict[str, RejectionCode] = {
     'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
 _CODES: dict[type[PprsError], RejectionCode] = {
-    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE', ConvergenceError: 'WORKSPACE',
+    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE',
     LimitError: 'LIMIT', EffectError: 'EFFECT'}
 
 

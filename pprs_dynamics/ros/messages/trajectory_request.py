@@ -363,7 +363,7 @@ def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str,
     determines the drives.
     """
     own = names or RobotNames.of(model)
-    if not model.moves_joints:
+    if model.robot.plans_poses:
         return {TRAJECTORY: RequestReader(MultiDOFJointTrajectory, [PLATFORM], own.frame)}
     readers = {TRAJECTORY: RequestReader(JointTrajectory, own.joints)}
     with suppress(ModelError):

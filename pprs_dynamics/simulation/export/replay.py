@@ -9,15 +9,12 @@ engine's soft constraints.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import OPEN, EngineState, add_sites
@@ -25,7 +22,7 @@ from pprs_dynamics.simulation.export.exported_robot import MJCF, ExportedRobot
 from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
-DURATION, RATE = 8.0, 100.0  # [s, Hz]
+DURATION = 8.0  # [s]
 AT_ONCE = 1e-9  # [m/s, rad/s], a width of turning over above rounding and below any motion
 
 
@@ -79,8 +76,7 @@ def replay(model: DriveModel, robot: ExportedRobot, text: str, kind: str) -> tup
     effort : (D,) array
         Root mean square of the model's efforts.
     """
-    motion: Any = (draw_motion(model, DURATION, 0) if model.moves_joints else Excitation(
-        duration=DURATION).motion(np.arange(0.0, DURATION, 1 / RATE)))
+    motion = draw_motion(model, DURATION, 0)
     state = model.initial_state()
     forces = model.measured(model.drive_forces(motion, state), state)
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))

@@ -120,8 +120,31 @@ class ModelJointFriction(Effect):
     def table(self, robot: Any, reversal: Reversal) -> Any:
         """Return the friction of joints as states take it, for each law of reversal."""
         if reversal not in self._tables:
-            self._tables[reversal] = robot.friction_table(self.blocks, reversal, is_own=True)
+            self._tables[reversal] = robot.friction_table(self.blocks, reversal)
         return self._tables[reversal]
+
+
+class PrintedFriction(ModelJointFriction):
+    """Friction in passive joints of a 3-PPRS by Eq. (12) to the letter.
+
+    The same total power as by `ModelJointFriction`, and another share per drive.
+    """
+
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
+        """Return Delta Q^p, (N, 6) [N]."""
+        robot, links = state.robot, state.links
+        k_r, k_s = robot.resistances(state, self.table(robot, state.reversal))
+        n, _ = robot.rod_rates(state)
+        omega = state.tool_velocity[:, 3:]
+        _, u_dot, _ = robot.rods(links)
+        about_u = (k_r + k_s) * u_dot - 2 * k_s * (n @ omega[..., None])[..., 0]
+        jacobians, _ = links.link_jacobians
+        *rods, platform = (robot.structure.links[name][0] for name in (
+            'rod_1', 'rod_2', 'rod_3', 'platform'))
+        found: Array = (np.einsum('nij,nijd,ni->nd', n, jacobians[:, rods], about_u)  # Eq. (12)
+                        + np.einsum('n,nj,njd->nd', k_s.sum(axis=1), omega,
+                                    jacobians[:, platform]))
+        return found
 
 
 class IndependentChainsFriction(ModelJointFriction):
@@ -151,7 +174,8 @@ class IndependentChainsFriction(ModelJointFriction):
 
     def singular(self, state: MechanismState) -> np.ndarray:
         """Return the samples at which this approach is not defined, (N,) bool."""
-        mask: np.ndarray = np.any(np.abs(state.links.cos_u) < self.minimum_cosine, axis=1)
+        u, *_ = state.robot.rods(state.links)
+        mask: np.ndarray = np.any(np.abs(np.cos(u)) < self.minimum_cosine, axis=1)
         return mask
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
@@ -165,19 +189,18 @@ class IndependentChainsFriction(ModelJointFriction):
         singular = self.singular(state)
         if np.any(singular):
             sample = int(np.argmax(singular))
-            smallest = np.abs(state.links.cos_u[sample])
+            smallest = np.abs(np.cos(state.robot.rods(state.links)[0, sample]))
             raise SingularityError(
                 sample, f'|cos u| of chain {int(np.argmin(smallest)) + 1} is '
                 f'{smallest.min():.3g}, where friction.approach independent_chains is unbounded',
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
-        found, robot = state.reactions, state.reactions.robot
-        k_r, k_s = found.resistances(self.table(robot, state.reversal))
-        omega, delta = state.motion.angular_velocity, np.asarray(robot.geometry.chain_angles)
-        along_axis = omega[:, 1:2] * np.cos(delta) - omega[:, :1] * np.sin(delta)
-        lever = robot.geometry.rod_length * found.cos_u
+        robot = state.robot
+        k_r, k_s = robot.resistances(state, self.table(robot, state.reversal))
+        (u, u_dot, _), (n, turning) = robot.rods(state.links), robot.rod_rates(state)
+        lever = robot.geometry.rod_length * np.cos(u)
         sign = -1.0 if robot.printed else 1.0
-        M_s_up, M_s_n = k_s * omega[:, 2:], -k_s * (found.u_dot - along_axis)  # Eq. (9)
-        M_r_n = -k_r * found.u_dot                                             # Eq. (9)
+        M_s_up = k_s * state.tool_velocity[:, 5:]                              # Eq. (9)
+        M_s_n, M_r_n = -k_s * np.sum(turning * n, axis=2), -k_r * u_dot        # Eq. (9)
         slides = sign * M_s_up / lever                                         # Eq. (13)
         lifts = sign * (M_s_n + M_r_n) / lever                                 # Eq. (13)
         return np.concatenate((slides, lifts), axis=1)

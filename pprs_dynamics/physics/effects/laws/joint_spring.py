@@ -82,5 +82,6 @@ class JointSpring(BodyEffect):
         for joint, _ in self.places:
             k, moment = self.exact[f'{joint}.stiffness'], self.exact[f'{joint}.moment']
             if k or moment:
-                torques[joint] = k * state.joint_position(joint) + moment
+                for name in state.robot.joints_of(joint):
+                    torques[name] = k * state.joint_position(name) + moment
         return StructureLoad(np.zeros((len(state.velocity), 6)), torques)
