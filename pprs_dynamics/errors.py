@@ -113,18 +113,12 @@ class UnknownNameError(ModelError):
         Names that exist, of which one or all are suggested.
     place : str, optional
         The key under which the name stands, where it is not a key itself.
-    instead : str, optional
-        What to write, where that is known better than by likeness.
     """
 
-    def __init__(
-        self, kind: str, name: str, known: Iterable[str], place: str = '', source: str = '',
-        instead: str = '',
-    ) -> None:
-        super().__init__(place or name, name, f'be a known {kind}', source)
-        self.kind, self.known = kind, tuple(known)
-        self.args = (kind, name, self.known, place, source, instead)
-        self.place, self.instead = place, instead
+    def __init__(self, kind: str, name: str, known: Iterable[str], place: str = '') -> None:
+        super().__init__(place or name, name, f'be a known {kind}')
+        self.kind, self.known, self.place = kind, tuple(known), place
+        self.args = (kind, name, self.known, place)
 
     @property
     def sentence(self) -> str:
@@ -136,8 +130,6 @@ class UnknownNameError(ModelError):
     @property
     def hint(self) -> str:
         """The similar name to use, or all known names."""
-        if self.instead:
-            return f'use {self.instead}'
         close = meant(self.value, self.known) if len(self.known) > 1 else ''
         known = f'known: {", ".join(self.known)}' if len(self.known) <= (
             FEW if close else MANY) else ''

@@ -79,7 +79,7 @@ def _block(model: DriveModel, recording: Recording) -> int:
     pieces = _pieces(recording, STRETCHES * round(SHORTEST_STRETCH / _step(recording)))
     busiest = pieces[int(np.argmax(_moved(recording, pieces)))]
     try:
-        smooth = smooth_drives(replace(recording, segments=(busiest,)), None,
+        smooth = smooth_drives(replace(recording, segments=(busiest,)),
                                model.blocks_per_period)
     except PprsError:
         return 1

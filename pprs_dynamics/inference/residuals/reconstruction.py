@@ -179,7 +179,7 @@ def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
     unit = 'rad' if all(units.turns for units in model.units) else 'm'
-    drives = smooth_drives(recording, None, model.blocks_per_period, unit)
+    drives = smooth_drives(recording, model.blocks_per_period, unit)
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)

@@ -303,9 +303,7 @@ def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,
     return replace(samples, effort=efforts, in_amperes=()), applied
 
 
-def write_recording(
-    path: str | PathLike[str], recording: Recording, topic: str = '/joint_states',
-) -> None:
+def write_recording(path: str | PathLike[str], recording: Recording) -> None:
     """Write a recording as .csv, bare .mcap, bare .db3, or, any other name, as a bag directory.
 
     CSV keeps every digit, but not `epoch`; bags keep stamps to 1 ns. Files are replaced,
@@ -322,7 +320,7 @@ def write_recording(
     if path.suffix == '.csv':
         write_csv(path, recording)
     else:
-        write_bag(path, {topic: recording})
+        write_bag(path, {'/joint_states': recording})
 
 
 def describe(recording: Recording) -> Summary:

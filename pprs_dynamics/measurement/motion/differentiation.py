@@ -158,9 +158,7 @@ def representative(stretches: Sequence[Stretch]) -> list[Stretch]:
     return parts
 
 
-def choose_smoothing(
-    stretches: Sequence[Stretch], duration: float | None = None, unit: str = 'm',
-) -> Smoothing:
+def choose_smoothing(stretches: Sequence[Stretch], unit: str = 'm') -> Smoothing:
     """Return the window with the least error in accelerations.
 
     For each window w the noise that it lets through is known, from that of the positions and its
@@ -172,8 +170,6 @@ def choose_smoothing(
     ----------
     stretches : sequence of Stretch
         Long enough for the shortest window.
-    duration : float, optional
-        Take this window [s], and only report its error.
     unit : str
         Of the positions.
 
@@ -183,11 +179,8 @@ def choose_smoothing(
     """
     step = min(stretch.step for stretch in stretches)
     noise = position_noise(stretches)
-    if duration is None:
-        longest = max(len(stretch.position) * stretch.step for stretch in stretches) / 3
-        windows = _windows(max(SHORTEST_WINDOW, min(LONGEST_WINDOW, int(longest / step))))
-    else:
-        windows = [max(SHORTEST_WINDOW, _odd(duration / step))]
+    longest = max(len(stretch.position) * stretch.step for stretch in stretches) / 3
+    windows = _windows(max(SHORTEST_WINDOW, min(LONGEST_WINDOW, int(longest / step))))
     errors: dict[int, Array] = {}
     window, least = windows[0], np.inf
     for tried in windows:
@@ -198,13 +191,12 @@ def choose_smoothing(
         elif squares > HOPELESS * least:
             break  # distortion only grows
     chosen = LocalPolynomial(window, step)
-    given = 'as asked for' if duration is not None else (
-        'for the least sum of noise and distortion'
-        + (', the longest one tried' if window == windows[-1] else ''))
+    is_longest = ', the longest one tried' if window == windows[-1] else ''
     text = (
         f'velocities and accelerations come from polynomials of order {ORDER} through the '
         f'positions over {window * step:.3g} s ({window} samples, cut-off {chosen.cut_off:.3g} '
-        f'Hz), {given}: positions have {root_mean_square(noise) * 1e6:.2g} u{unit} rms of noise, '
+        f'Hz), for the least sum of noise and distortion{is_longest}: positions have '
+        f'{root_mean_square(noise) * 1e6:.2g} u{unit} rms of noise, '
         f'accelerations keep {root_mean_square(errors[window]):.2g} {unit}/s^2 rms of error')
     return Smoothing(window * step, noise, noise * chosen.noise_gain(1), errors[window], text)
 

@@ -77,15 +77,13 @@ class DriveMotion:
     notes: tuple[str, ...]
 
 
-def smooth_drives(recording: Recording, window: float | None = None,
-                  blocks_per_period: float = 0.0, unit: str = 'm') -> DriveMotion:
+def smooth_drives(recording: Recording, blocks_per_period: float = 0.0, unit: str = 'm',
+                  ) -> DriveMotion:
     """Return the motion of a recording's drives, with one window for all of them.
 
     Parameters
     ----------
     recording : Recording
-    window : float, optional
-        Duration of the window [s], instead of the choice from the data.
     blocks_per_period : float
         See `block_duration`.
     unit : str
@@ -108,7 +106,7 @@ def smooth_drives(recording: Recording, window: float | None = None,
     grids, told = _grids(recording, segments)
     stretches = representative([_stretch(recording, part, grid)
                                 for part, grid in zip(segments, grids, strict=True)])
-    smoothing = choose_smoothing(stretches, window, unit)
+    smoothing = choose_smoothing(stretches, unit)
     recorded = better_recorded(stretches, smoothing)
     notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
 
