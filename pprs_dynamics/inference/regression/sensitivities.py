@@ -27,7 +27,6 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import AddedBody, BodyEffect, StructureEffect
-from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.state import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
@@ -36,6 +35,7 @@ from pprs_dynamics.physics.model.keys import GAIN
 # A number is moved by this share of itself, a coefficient by this share of its scale: rounding
 # and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
+POSITION_STEP = 1e-5  # [m, rad] of a drive
 DEVIATIONS = 2.5
 # Of slow columns, see `Samples`; friction of a closed form turns where loads change sign.
 NODES_PER_PERIOD, GUIDE_NODES = 40, 120
@@ -234,9 +234,10 @@ class Sensitivities:
 
         Of each drive, (N, D) each.
         """
-        step, before = state.robot.position_step, self._own_efforts(state)
-        return ([(self._efforts(self.model, self._at(self.model, state.perturbed(drive, -step)))
-                  - before) / step for drive in range(len(self.model.drives))],
+        before = self._own_efforts(state)
+        return ([(self._efforts(
+            self.model, self._at(self.model, state.perturbed(drive, -POSITION_STEP)))
+                  - before) / POSITION_STEP for drive in range(len(self.model.drives))],
                 [*-state.robot.inertia(state)])
 
     def _efforts(self, model: DriveModel, state: Any) -> Array:
@@ -399,9 +400,8 @@ class Samples:
             return cls(state, treat, sensors, np.arange(count), state)
         at = np.round(np.linspace(0, count - 1, -(-(count - 1) // stride) + 1)).astype(int)
         links = state.links
-        known = LinkMotion(links.structure, links.rows[at]) if isinstance(
-            links, LinkMotion) else None
-        return cls(state, treat, sensors, at, replace(state[at], known=known))
+        return cls(state, treat, sensors, at, replace(
+            state[at], known=replace(links, rows=links.rows[at])))
 
     def treated(self, columns: Sequence[Array]) -> Array:
         """Return columns (N, D) as sensors show them, treated, (M, K, D)."""

@@ -248,16 +248,6 @@ class LinkMotion:
                                       added, [*unit] * len(rows))
         return np.moveaxis(found[:, :, 0], 0, -1)
 
-    def inertia(self, by_joint: Array) -> Array:
-        """Return the efforts by bodies (J + 1, 10) per acceleration of each drive, (D, N, D)."""
-        added = [(drive, row, tree.WITH_DRIVE + drive)
-                 for drive in range(len(self.structure.drives))
-                 for row in np.flatnonzero(by_joint.any(axis=1))]
-        found = self.changes_by_loads(
-            self._no_loads()[1], NO_FRICTION, NO_GUIDES, len(self.structure.drives), added,
-            [np.append(by_joint[row], np.zeros(3)) for _, row, _ in added])
-        return found[:, :, 0]
-
     def _no_loads(self) -> tuple[Array, Loads]:
         sizes = self.structure.evaluation.sizes
         table = np.zeros((len(self.rows), tree.length_of(Loads, sizes)))

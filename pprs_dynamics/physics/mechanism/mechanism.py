@@ -28,7 +28,7 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.link_motion import LinkMotion, ToolPose
+from pprs_dynamics.physics.mechanism.link_motion import NO_GUIDES, LinkMotion, ToolPose
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.state import (
     MECHANISM,
@@ -54,8 +54,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     InverseDynamicsResult,
     JointFriction,
 )
-
-POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,11 +273,6 @@ class Mechanism:
         return tuple(name for name, kind in zip(self.drives, self.structure.kinds, strict=True)
                      if kind == REVOLUTE)
 
-    @property
-    def position_step(self) -> float:
-        """Step of a drive for derivatives by its position [rad, m]."""
-        return POSITION_STEP
-
     @cached_property
     def tool_pose(self) -> ToolPose:
         """The drives' motion from that of the tool.
@@ -372,8 +365,13 @@ class Mechanism:
 
     def inertia(self, state: MechanismState) -> Array:
         """Return the efforts per acceleration of each drive, (D, N, D) [kg, kg m^2, kg m]."""
-        found: Array = state.links.inertia(self.by_joint)
-        return found + np.diag(self.armature)[:, None]
+        drives = range(len(self.drives))
+        added = [(drive, row, tree.WITH_DRIVE + drive) for drive in drives for row in self.bodies]
+        found = state.links.changes_by_loads(
+            state.reactions, NO_FRICTION, NO_GUIDES, len(drives), added,
+            [np.append(self.by_joint[row], np.zeros(3)) for _, row, _ in added])
+        inertia: Array = found[:, :, 0] + np.diag(self.armature)[:, None]
+        return inertia
 
     def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
         """Return closed coordinates, efforts and own friction in one pass."""

@@ -55,7 +55,6 @@ NOT_WANTED = np.empty((0, closed_form.COORDINATES))
 LINKS = (*DRIVES, *RODS, PLATFORM)  # that move, in the order of `ThreePprs.inertial`
 OF_RODS = np.s_[6:9]  # in `LINKS`
 ALIKE = {REVOLUTE: HINGES, SPHERICAL: BALLS}  # of the tree
-POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 # The condition number of a long trajectory is computed at this many samples, evenly spread:
 # neighbours hardly differ, and a singular value decomposition costs more than the model.
 MOST_CONDITIONS = 64
@@ -285,11 +284,6 @@ class ThreePprs(Mechanism):
     def moved_mass(self) -> float:
         """Mass of the platform and its payload [kg]."""
         return float(self.masses[-1])
-
-    @property
-    def position_step(self) -> float:
-        """Step of a drive for derivatives by its position [m]."""
-        return POSITION_STEP * self.geometry.rod_length
 
     def heavier(self, link: str, mass: float) -> Self:
         """Return the robot with a payload, or with rods, that weigh more [kg]."""
