@@ -143,7 +143,7 @@ def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 
 def _effects_table(diagnosis: Diagnosis, rows: Sequence[Sequence[str]], **options: Any) -> Any:
     return text_table(*plain_rows((HEADINGS, rows)), right=(2, 3, 4),
-                      whole=(0, 2, 3, 4), **options)
+                      whole=(0, 3, 4), **options)
 
 
 def _values(diagnosis: Diagnosis) -> Iterator[TitledTable]:

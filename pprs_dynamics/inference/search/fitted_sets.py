@@ -34,6 +34,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
+SHAPE_DIGITS = 4  # of a shape: at the optimum a cost changes by less than the least improvement
 NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 
@@ -299,7 +300,9 @@ class FittedSets:
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 bounded = parameter.of(units_of(self.design.given, component.drive).turns)
-                shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
+                # Rounded, so that the same optimum is one set, from wherever it was reached.
+                shape[parameter.name] = float(
+                    f'{np.clip(value, bounded.lower, bounded.upper):.{SHAPE_DIGITS}g}')
             shapes[block] = shape
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(

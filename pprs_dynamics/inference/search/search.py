@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Fitted
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
 
-MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
+MOST_EFFECTS, MOST_UNKNOWN = 6, 4  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED, FIRST_REFINED = 3, 6  # of the sets fitted in a round, and of those of one effect
@@ -142,7 +142,7 @@ class Search:
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
                                                   for component in fitted.blocks)]
         # The first effect decides which way the search goes.
-        for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
+        for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.total)):
             if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
         # A scan puts it where each drive pays by itself: with others that is seldom right.
@@ -193,6 +193,11 @@ class Search:
         for candidate in best.candidates:
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             yield from self._instead(best, best.without(candidate), None)
+        for candidate in best.effects:
+            # Friction that differs by direction contains other effects, another on each drive.
+            for component in candidate.components if candidate.effect.symmetric and len(
+                    candidate.components) > 1 else ():
+                yield from self._instead(best, reduced(best, component), REPLACEMENTS)
         for pair in combinations(best.candidates, 2):
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
