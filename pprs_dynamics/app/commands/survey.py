@@ -31,6 +31,7 @@ LOOPBACK = '127.0.0.1'
 ALLOWED_FAILURES = 2  # workers that an item may lose before it is given up
 REACHED_WITHIN = '15s'  # the scheduler
 SILENCE = '60s'  # without a message a worker is killed and started again
+NEVER = '365 days'
 MOST_SHOWN = 10  # errors
 STOPPED = 'the scheduler has stopped; what was written remains, and the same command does the rest'
 MOST_WORKERS = 1024
@@ -81,6 +82,9 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
                 # What waits at a worker that dies would count as what killed it.
                 'distributed.scheduler.worker-saturation': 1.0,
                 'distributed.scheduler.worker-ttl': SILENCE,
+                # Else a worker that is being started again is closed for good, where another one
+                # of its name died 15 s before.
+                'distributed.deploy.lost-worker-timeout': NEVER,
                 'distributed.admin.log-format': ''}
     for name in ('distributed', 'distributed.client'):  # what happens is one sentence of ours
         logging.getLogger(name).setLevel(logging.CRITICAL)
