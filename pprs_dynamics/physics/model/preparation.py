@@ -37,4 +37,7 @@ def prepare(model: DriveModel) -> None:
 
 if __name__ == '__main__':
     for file in DEFAULT_MODEL, LOOPS_MODEL:
-        prepare(DriveModel.load(file))
+        loaded = DriveModel.load(file)
+        prepare(loaded)
+        state = loaded.drive_forces(loaded.robot.at_home(SAMPLES)).mechanism
+        list(loaded.robot.under_loads(state, [state]))  # what the columns of a diagnosis need
