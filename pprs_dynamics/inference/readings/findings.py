@@ -12,7 +12,6 @@ from typing import Any, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveColumns
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
@@ -138,8 +137,8 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
                                          scales=changes))
 
     def of(kind: str, group: Sequence[int], what: str) -> None:
-        changes = tuple((drives[k], 'effort_scale', _as_read(
-            model, drives[k]).effort_scale / float(scales[k])) for k in group)
+        changes = tuple((drives[k], 'effort_scale', model.recorded.columns_of(
+            drives[k]).effort_scale / float(scales[k])) for k in group)
         noun = f'the effort of {named(drives, tuple(group))}'
         found.append(OtherReading.of(kind, drives, group, f'{noun} {what}', scales=changes))
 
@@ -200,8 +199,8 @@ def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterato
         yield OtherReading.of(
             'velocity', drives, group, f'the recorded velocity of {named(drives, tuple(group))} '
             f'is {times} the derivative of the position', scales=tuple(
-                (drives[k], 'velocity_scale', _as_read(model, drives[k]).velocity_scale / factor)
-                for k in group))
+                (drives[k], 'velocity_scale',
+                 model.recorded.columns_of(drives[k]).velocity_scale / factor) for k in group))
 
 
 def near(factor: float, units: Iterable[float]) -> float:
@@ -221,16 +220,11 @@ def velocity_factors(excerpt: Excerpt) -> dict[int, float]:
     return found
 
 
-def _as_read(model: DriveModel, drive: str) -> DriveColumns:
-    """Return the columns and scales with which a model file reads a drive."""
-    return model.recorded.columns_of(drive)
-
-
 def position_scales(model: DriveModel, part: Reading, whole: Reading) -> Scales:
     """Return the factors and offsets below `columns` that a part of a reading changes."""
     found: list[tuple[str, str, float]] = []
     for k in part.drives:
-        before, factor = _as_read(model, model.drives[k]), float(whole.scale[k])
+        before, factor = model.recorded.columns_of(model.drives[k]), float(whole.scale[k])
         if part.scale[k] != 1:
             found.append((model.drives[k], 'position_scale', factor * before.position_scale))
         if part.offset[k] or (part.scale[k] != 1 and before.position_offset):
@@ -245,7 +239,7 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
     moved = [(keys, places) for keys, places in (
         (('position', 'velocity'), reading.positions), (('effort', 'current'), reading.efforts))
         if np.any(places != np.arange(len(drives)))]
-    names = {drive: _as_read(model, drive).names for drive in drives}
+    names = {drive: model.recorded.columns_of(drive).names for drive in drives}
     if not any(names.values()):
         if len(moved) > 1:
             return (), 'joint_map: {' + ', '.join(
@@ -312,9 +306,10 @@ def knows_forces(model: DriveModel) -> bool:
 
 def find_shares(model: DriveModel) -> Iterator[OtherReading]:
     """Yield efforts that are a share of an unknown torque or force."""
-    group = [d for d, drive in enumerate(model.drives) if is_share(_as_read(model, drive))]
+    columns = [model.recorded.columns_of(drive) for drive in model.drives]
+    group = [d for d, of_drive in enumerate(columns) if is_share(of_drive)]
     if group:
-        named_so = ', '.join(str(_as_read(model, model.drives[d]).names['effort']) for d in group)
+        named_so = ', '.join(str(columns[d].names['effort']) for d in group)
         yield OtherReading.of(
             'effort_share', model.drives, group,
             f'{named_so}: a share of a torque or force that the file does not name',

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array, Integers, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.stamps import stretches
 
 # Samples that may be missing, in times the usual distance of those that were measured: over more
 # missing ones a stretch ends.
@@ -140,8 +140,8 @@ class Residuals:
 
         Each stretch is of one segment, and starts and ends with a measurement.
         """
-        stretches = []
-        for part in _runs(self.segment):
+        found = []
+        for part in stretches(self.segment):
             known = part.start + np.flatnonzero(np.isfinite(self.measured[part, drive]))
             if len(known):
                 steps = np.diff(known)
@@ -149,8 +149,8 @@ class Residuals:
                 cuts = np.flatnonzero(steps > LONGEST_BRIDGE * usual + 1)
                 begins = np.concatenate(([known[0]], known[cuts + 1]))
                 ends = np.concatenate((known[cuts], [known[-1]])) + 1
-                stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
-        return stretches
+                found += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
+        return found
 
 
 def rms(residuals: Residuals) -> float:
@@ -163,12 +163,6 @@ def rms_by_drive(residuals: Residuals) -> dict[str, float]:
     return {drive: root_mean_square(residuals.error[:, d])
             for d, drive in enumerate(residuals.drives)
             if np.isfinite(residuals.error[:, d]).any()}
-
-
-def _runs(segment: Integers) -> list[slice]:
-    cuts = np.flatnonzero(np.diff(segment)) + 1
-    edges = [0, *cuts.tolist(), len(segment)]
-    return [slice(a, b) for a, b in pairwise(edges) if b > a]
 
 
 def _require(condition: bool, quantity: str, found: str, rule: str) -> None:

@@ -47,8 +47,8 @@ IRREGULAR_SPREAD = 0.5
 
 def stretches(numbers: Indices) -> list[slice]:
     """Return the stretches of samples, which have the same number each, as slices."""
-    edges = [*np.flatnonzero(np.diff(numbers, prepend=-1)).tolist(), len(numbers)]
-    return [slice(first, end) for first, end in pairwise(edges)]
+    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
+    return [slice(first, end) for first, end in pairwise(edges) if end > first]
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
