@@ -284,11 +284,12 @@ class Search:
         weight of a plane arm cannot separate a zero from the mounting of the base.
         """
         def written(reading: Reading) -> bytes:
-            """Return what a line would change but signs, whose convention a sentence mentions."""
-            scales = np.abs(reading.effort_scale)
-            positive = replace(reading, load=0.0, scale=np.abs(reading.scale),
-                               offset=reading.offset * np.sign(reading.scale) + 0.0)
-            return positive.of_motion + reading.efforts.tobytes() + (
+            """Return what a line would change; all positions negated are all efforts negated."""
+            sign = -1.0 if np.all(reading.scale < 0) else 1.0
+            scales = sign * reading.effort_scale
+            same = replace(reading, load=0.0, scale=sign * reading.scale,
+                           offset=sign * reading.offset + 0.0)
+            return same.of_motion + reading.efforts.tobytes() + (
                 scales.tobytes() if np.all(np.isin(scales, table.SCALES)) else b'constants')
 
         seen, found = {written(best.reading)}, []
@@ -310,12 +311,9 @@ class Search:
         # A mounting without weight explains none.
         if evidence is None or (reading.gravity is not None and not evidence.has_weight):
             return []
-        weights = self._weights(reading, excerpt, evidence)
-        measured = [d for d in np.flatnonzero(weights > 0).tolist()
-                    if evidence.is_measured(d, reading.efforts[d])]
+        measured = self._measured(reading, excerpt, evidence)
         if not measured:
             return []
-        weight = weights[measured]
 
         @cache
         def likelihood(d: int, scale: float) -> Likelihood:
@@ -324,18 +322,17 @@ class Search:
         def fit_of(scales: Array, price: float, share: str = '') -> Fit:
             found = [likelihood(d, float(scales[d])) for d in measured]
             score, prior, residual = np.array(found).T
+            # A guess of one mass is a guess of all.
             return Fit(replace(reading, effort_scale=scales, share=share),
-                       float(weight @ score) - cost - price + max(
-                           float(weight @ prior) - table.ALL_MASSES_MOST, 0.0),
-                       float(np.exp(np.average(np.log(residual), weights=weight))),
-                       float(residual.max()), float(prior.max()), float(residual.min()),
-                       float(np.average(prior, weights=weight)))
+                       float(np.sum(score + prior) - prior.max()) - cost - price,
+                       float(np.exp(np.mean(np.log(residual)))), float(residual.max()),
+                       float(prior.max()), float(residual.min()), float(np.mean(prior)))
 
         def alone(d: int, scales: Sequence[float]) -> float:
-            return max((likelihood(d, scale).score - _cost([scale]) / weights[d], scale)
+            return max((likelihood(d, scale).score - _cost([scale]), scale)
                        for scale in scales)[1]
 
-        first = fit_of(np.ones(len(weights)), 0.0)
+        first = fit_of(np.ones(len(self.model.drives)), 0.0)
         fits = [first, *(fit_of(*row) for row in self._effort_rows(
             reading, evidence, measured, alone))]
         if {'position_offset', 'position_unit', 'mounting', 'load'} & {
@@ -404,16 +401,17 @@ class Search:
             yield (np.where(np.isin(drives, known), factors, np.median(factors[known])),
                    price + self.cost_of_constants, '')
 
-    def _weights(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> Array:
-        """Return the weight of each drive, (D,): 1 for the strongest, 0 for one at rest."""
+    def _measured(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> list[int]:
+        """Return the drives that move, if some do, and whose efforts are no zeros among others."""
         effort = np.sqrt(np.mean(np.nan_to_num(excerpt.effort[:, reading.efforts]) ** 2, axis=0))
         # As recorded: in a larger unit a drive at rest would move, and count for that unit.
         recorded = self.evidence(self.rows[0]) or evidence
         moves, size = recorded.moves(self.model)[reading.positions], recorded.size
-        sizes = np.maximum(effort / max(effort.max(), 1e-300), size / max(size.max(), 1e-300))
-        found = np.where((sizes > table.WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
-        weights: Array = found * (moves if np.any(moves & (found > 0)) else 1.0)
-        return weights
+        found = (effort > 0) & (np.maximum(effort / max(effort.max(), 1e-300), size / max(
+            size.max(), 1e-300)) > table.LEAST_FORCE)
+        found &= moves | (not np.any(moves & found))
+        return [d for d in np.flatnonzero(found).tolist()
+                if evidence.is_measured(d, reading.efforts[d])]
 
     def _is_certain(self, fit: Fit) -> bool:
         """Whether friction says the same as weight of efforts that are negated.
@@ -423,15 +421,11 @@ class Search:
         reading, evidence = fit.reading, self.evidence(fit.reading)
         if evidence is None or not np.any(reading.effort_scale < 0):
             return evidence is not None
-        weights, votes = self._weights(
-            reading, self.excerpts[reading.time_unit], evidence), 0.0
         moves = evidence.moves(self.model)
-        for d in np.flatnonzero((reading.effort_scale < 0) & moves).tolist():
-            column = int(reading.efforts[d])
-            if evidence.is_measured(d, column):
-                some = Shares.of(evidence, d, column)
-                votes += float(weights[d] * np.sign(some.friction)) * some.has_friction
-        return votes <= 0
+        found = [Shares.of(evidence, d, int(reading.efforts[d])) for d in self._measured(
+            reading, self.excerpts[reading.time_unit], evidence)
+            if reading.effort_scale[d] < 0 and moves[d]]
+        return bool(sum(np.sign(some.friction) for some in found if some.has_friction) <= 0)
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes."""

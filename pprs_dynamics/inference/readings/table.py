@@ -55,7 +55,6 @@ SAMPLES = 12.0
 CLOSEST = 2e-4
 # Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
 MASSES, MASSES_MOST = 0.35, 7.0
-ALL_MASSES_MOST = 14.0  # that of all drives together: a guess of one mass is a guess of all
 SAME_BALANCE = 1e-3  # standard deviation of the weight of a single body over its mass
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
@@ -85,7 +84,8 @@ CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
 RESTING = 0.01  # [rad/s, m/s] speed from which a drive moves, however wide friction turns over
-WEAK = 0.01  # efforts and swings that are this much smaller than others are no evidence
+WEAK = 0.01  # swings that are this much smaller than others are no evidence
+LEAST_FORCE = 1e-3  # the same, of efforts: weak drives may be negated, too
 
 # ------------------------------------------------------------------------- scales of efforts
 
