@@ -105,8 +105,7 @@ def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -
 def test_nothing_is_said_of_what_is_right(path: str) -> None:
     time, position, velocity, effort = robot(path=path)
     assert told((time + 1.7e9, position, velocity, effort)) == []
-    bare = Recording.from_arrays('bare', time, position)
-    assert find_mistakes(MODEL, bare) == ()
+    assert find_mistakes(MODEL, Recording.from_arrays('bare', time, position)) == ()
 
 
 @pytest.mark.parametrize('name', [
@@ -252,9 +251,10 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
         'reach: {effort_scale: 0.3}}')
 
 
-OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of it
+OTHERS = {  # folder, model, recording, a clause of what is told, and signs of the efforts
     'sign': ('kuka_sign', 'iiwa_unflipped.yaml', 'dyn.csv.gz', 'effort of all drives .* minus'),
     'sign read': ('kuka_sign', 'iiwa.yaml', 'dyn.csv.gz', ''),
+    'weak': ('kuka_sign', 'iiwa.yaml', 'dyn.csv.gz', 'effort of j6 .* minus', 1, 1, 1, 1, 1, -1, 1),
     'degrees': ('kr300_degrees', 'kr_deg.yaml', 'A.csv.gz', 'positions of all drives .* degrees'),
     'degrees read': ('kr300_degrees', 'kr.yaml', 'A.csv.gz', ''),
     'radians': ('false_units', 'nofric.yaml', 'r0.csv.gz', ''),
@@ -264,9 +264,9 @@ OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of i
 
 @pytest.mark.parametrize('case', OTHERS)
 def test_recordings_of_other_people(case: str) -> None:
-    folder, model_file, run, clause = OTHERS[case]
+    folder, model_file, run, clause, *signs = OTHERS[case]
     model, whole = shared_case(folder, model_file, run)
     part = slice(len(whole.time) // 3, None)
     piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
-                                  whole.effort[part], model.drives)
+                                  whole.effort[part] * (signs or [1]), model.drives)
     expect([mistake.what for mistake in find_mistakes(model, piece)], [clause] * bool(clause))
