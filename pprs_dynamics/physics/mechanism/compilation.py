@@ -151,6 +151,7 @@ def _inlined(function: FunctionType) -> Any:
                       no_cfunc_wrapper=True, _nrt=False)(function)
 
 
+@cache
 def _names(code: CodeType) -> set[str]:
     """Return the global names that a function and those within it look up."""
     own = {step.argval for step in dis.get_instructions(code) if step.opname == 'LOAD_GLOBAL'}

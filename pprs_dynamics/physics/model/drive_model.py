@@ -330,6 +330,8 @@ class DriveModel:
             # Very large numbers overflow; users of the result check that it is finite.
             with np.errstate(over='ignore', invalid='ignore'):
                 mechanism = self.mechanism(motion, closed)
+                if parameters is not None and isinstance(motion, JointMotion):
+                    vars(mechanism)['inverse_dynamics'] = None  # a second pass would fail alike
                 forces = self.forces_at(mechanism, state)
             if state is not None:
                 self.robot.remember(mechanism, state.closed)
