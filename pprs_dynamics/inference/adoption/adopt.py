@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,7 @@ def adopt(
             found = _with_effect(case, request, beside or ())
         except (ModelError, EffectRequestError) as error:
             force = False
-            found = case.adoption(request, model, 2 * case.residuals(recordings, model), (), None, (
+            found = replace(case.adoption(request, model, (nan, nan), None, ()), objections=(
                 f'its fit gives no model: {error}',))
     report(1.0)
     is_sure = not found.objections
@@ -164,7 +165,7 @@ class _Case:
 
     @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
                   'held out')
-    def objections(self, gain: PredictiveGain | None, errors: Sequence[float], where: str,
+    def objections(self, gain: PredictiveGain | None, errors: tuple[float, float], where: str,
                    unit: str) -> tuple[str, ...]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
 
@@ -179,23 +180,19 @@ class _Case:
         unit : str
             Of the errors.
         """
-        if gain is None:
-            return (f'the error on {where} cannot be computed',)
-        before, after = errors
-        said = f'the error on {where} {change(before, after, unit)}'
         # Newtons and newton metres have no sum: there each drive is judged by itself.
-        if self.is_alone and not after < before and unit in EFFORT_UNITS:
-            return (said,)
-        if gain.confirms:
+        does_fall = errors[1] < errors[0] or not self.is_alone or unit not in EFFORT_UNITS
+        if gain is not None and gain.confirms and does_fall:
             return ()
-        if gain.losing:
-            return (f'{said}. On {listed(gain.losing)} it certainly rises',)
-        return (f'the error on {where}, weighted by the noise, falls by {gain.certainty:.2g} '
-                f'standard errors, and at least {SURE:g} must be reached',)
+        said = f'the error on {where} {change(errors[0], errors[1], unit)}'
+        if gain is None or not does_fall:
+            return (said,)
+        rises = f'. On {listed(gain.losing)} it rises' if gain.losing else ''
+        return (f'{said}, by {gain.certainty:.2g} standard errors if weighted by the noise, and '
+                f'at least {SURE:g} must be reached{rises}',)
 
-    def adoption(self, request: EffectRequest, after: DriveModel,
-                 residuals: Sequence[Residuals], held_out: Sequence[float],
-                 gain: PredictiveGain | None, objections: tuple[str, ...], **details: Any,
+    def adoption(self, request: EffectRequest, after: DriveModel, held_out: tuple[float, float],
+                 gain: PredictiveGain | None, objections: Sequence[str], **details: Any,
                  ) -> Adoption:
         """Return the undecided adoption of a model, with all objections.
 
@@ -203,37 +200,28 @@ class _Case:
         ----------
         request : EffectRequest
         after : DriveModel
-        residuals : (before, after)
-            On the recordings.
         held_out : (before, after)
             Errors on blocks of the recordings [N]; on validation recordings they are computed.
         gain : PredictiveGain or None
             On held-out data.
-        objections : tuple of str
+        objections : sequence of str
         details
             Further fields of the adoption.
         """
-        before, with_it = residuals
-        errors = [rms(before), rms(with_it)]
+        before, with_it = self.residuals(self.recordings, self.model, after)
         if self.validate:
-            held_out = [rms(found) for found in self.residuals(self.validate, self.model, after)]
-        if after is not self.model:
-            objections += (
-                self.objections(predictive_gain(before, with_it), errors, 'the recordings',
-                                before.unit)
-                or self.objections(gain, held_out, self.held_out, before.unit))
-        first, last = held_out or errors
-        fall = change(first, last, before.unit)
-        if gain is not None and not last < first:
-            sure = max(gain.certainty, *gain.by_drive.values())
-            fall = (f'falls by {sure:.2g} standard errors, weighted by the noise; the unweighted '
-                    f'error {fall}')
+            first, last = self.residuals(self.validate, self.model, after)
+            held_out = rms(first), rms(last)
+        against = self.objections(predictive_gain(before, with_it), (rms(before), rms(with_it)),
+                                  'the recordings', before.unit)
         return Adoption(**{
             'request': request, 'drives': request.drives, 'before': self.model, 'after': after,
-            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': first,
-            'held_out_after': last, 'held_out_on': VALIDATION if self.validate else BLOCKS,
-            'noise_floors': self.diagnosis.noise_floors, 'objections': objections,
-            'reason': f'the error on {self.held_out} {fall}',
+            'residuals_before': before, 'residuals_after': with_it, 'held_out_before': held_out[0],
+            'held_out_after': held_out[1], 'held_out_on': VALIDATION if self.validate else BLOCKS,
+            'noise_floors': self.diagnosis.noise_floors,
+            'objections': (*objections, *(against or self.objections(
+                gain, held_out, self.held_out, before.unit))),
+            'reason': f'the error on {self.held_out} {change(held_out[0], held_out[1], before.unit)}',
             'reference': () if self.reference is None else self.reference.names, **details})
 
 
@@ -255,38 +243,31 @@ def _with_effect(case: _Case, request: EffectRequest, beside: Sequence[FoundEffe
     candidate = next(c for c in row.effects if c.name == name)
     effect = answer.found(candidate)
     after, gone = requested_model(answer, (*beside, effect))
-    objections = list(_of_table(case, request, table, row, effect))
-    if refused := [component.drive for component in row.fits.refused(row.fitted)
-                   if component.effect is effect.effect]:
-        places = listed([answer.drives[d] for d in refused if d is not None])
-        objections.append(f'the values of {name} that fit best are impossible'
-                          f'{places and f" on {places}"}: beyond its bounds, or more is taken away '
-                          'than the model has')
-    residuals = case.residuals(case.recordings, case.model, after)
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(table.first.decisions.rival_margin)
-        if name in (*rival.missing, *rival.instead)
-        for other in (rival.instead if name in rival.missing else rival.missing)))
-    others = [c.name for c in row.effects if c.name != name]
-    remarks = [f'{name}{" of " + place.rstrip(".") if place else ""} is removed from the model: '
-               'the recordings show none of it' for place in gone]
+        for mine, theirs in ((rival.missing, rival.instead), (rival.instead, rival.missing))
+        if name in mine for other in theirs))
+    remarks = []
     if rivals:
-        remarks.insert(0, f'{listed(rivals, "or")} explains the data about as well')
+        remarks.append(f'{listed(rivals, "or")} explains the data about as well')
+    remarks += [f'{name}{" of " + place.rstrip(".") if place else ""} is removed from the model: '
+                'the recordings show none of it' for place in gone]
     if effect.at_bound:
         remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
                        'were tried')
-    if others:
+    if others := [c.name for c in row.effects if c.name != name]:
         remarks.append(f'The recordings also show {listed(others)}')
     # Without the other effects of the row, in the values that they all have together.
     known = [component for c in row.effects for effect in beside if effect.name == c.name
              for component in c.components]
-    held_out = [] if case.validate else [
-        hold_out(row.fits, row.fitted, only).error
-        for only in (known, (*known, *candidate.components))]
+    held_out = (nan, nan) if case.validate else (
+        hold_out(row.fits, row.fitted, known).error,
+        hold_out(row.fits, row.fitted, (*known, *candidate.components)).error)
     prefix = f'effects.{name}.'
     return case.adoption(
-        request, after, residuals, held_out, effect.gain, tuple(objections), drives=effect.drives,
-        remarks=tuple(remarks), rivals=rivals, moments=effect.moments, parameters={
+        request, after, held_out, effect.gain, _of_table(case, request, row, effect, bool(rivals)),
+        drives=effect.drives, remarks=tuple(remarks), rivals=rivals, moments=effect.moments,
+        parameters={
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
@@ -309,22 +290,20 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
     """
     rows = [table.best, *(rival.row for rival in table.rivals(
         table.first.decisions.rival_margin))]
-    if request.name in table.alone:
-        rows.append(Row(table.first, table.alone[request.name]))
-    row, found = next(((row, c) for row in rows for c in row.effects if c.name == request.name),
-                      (None, None))
+    known = [(row, c) for row in rows for c in row.effects if c.name == request.name]
     fits, rest = table.first, tuple[Candidate, ...]()
-    if row is not None and found is not None:
+    if known:
+        row, found = known[0]
         if request.drives in (None, row.fits.design.named(found.drives)):
             return row if row.is_exact else Row.exact(row.fits, row.fitted)
         fits, rest = row.fits, row.fitted.without(found)
     design, scan = fits.design, Scan(fits)
     offers = scan.offers(fits.evaluate(rest)).get(request.effect, [])
-    if request.drives is not None:
-        wanted = set(map(design.drives.index, request.drives))
-        chosen = [component for _, component in offers if component.drive in wanted]
-    else:
+    if request.drives is None:
         chosen = scan.best_drives(request.effect, offers, None)[1] if offers else []
+    else:
+        chosen = [component for _, component in offers if component.drive is not None
+                  and design.drives[component.drive] in request.drives]
     if len(chosen) < len(request.drives or (None,)):
         standing = [name for name in request.drives or design.drives
                     if not design.moves(design.drives.index(name))]
@@ -396,27 +375,29 @@ def _gone(answer: Answer, found: FoundEffect) -> tuple[str, ...]:
     return tuple(places)
 
 
-def _of_table(case: _Case, request: EffectRequest, table: ModelTable, row: Row,
-              effect: FoundEffect) -> tuple[str, ...]:
+def _of_table(case: _Case, request: EffectRequest, row: Row, effect: FoundEffect,
+              is_rival: bool) -> tuple[str, ...]:
     """Return why the table does not report the requested effect; nothing where it does."""
+    table, name = case.diagnosis.selection, request.name
+    assert table is not None
     if effect.course is not None:
         return (f'it is there{effect.when} only, and a model has it all the time: record the '
                 'machine in its present state',)
-    best = next((c for c in table.best.effects if c.name == request.name), None)
+    if any(component.effect is effect.effect for component in row.fits.refused(row.fitted)):
+        return (f'the values of {name} that fit best are impossible: beyond its bounds, or more '
+                'is taken away than the model has',)
+    best = next((c for c in table.best.effects if c.name == name), None)
     known = table.first.design.named(best.drives) if best else None
     if known and (missed := [drive for drive in effect.drives or () if drive not in known]):
-        return (f'the recordings show {request.name} on {listed(known)}, not on {listed(missed)}',)
-    if best or any(request.name in rival.instead
-                   for rival in table.rivals(table.first.decisions.rival_margin)):
+        return (f'the recordings show {name} on {listed(known)}, not on {listed(missed)}',)
+    if best or is_rival:
         return ()
-    more = f'the set with {request.name} costs {plain(row.cost - table.best.cost, 2)} more'
+    more = f'the set with {name} costs {plain(row.cost - table.best.cost, 2)} more'
     for first in case.diagnosis.effects:
         on = f' on {listed(first.drives)}' if first.drives else ''
         return (f'{first.name}{on} explains these recordings better ({more})',)
-    if request.present(case.model):
-        return (f'{request.name} is in the model already, and the recordings support no other '
-                f'values ({more})',)
-    return (f'the recordings do not support {request.name}: {more} than the model without it',)
+    other = 'other values of ' if request.present(case.model) else ''
+    return (f'the recordings do not support {other}{name}: {more} than the model as it is',)
 
 
 # A measured curve
@@ -451,7 +432,7 @@ def _with_curve(case: _Case, request: EffectRequest) -> Adoption:
         remarks.append(f'The recordings also show {others}: adopt causes first. A curve in '
                        'their place is valid for this motion only')
     return case.adoption(
-        request, after, case.residuals(case.recordings, model, after), (rms(given), rms(found)),
+        request, after, (rms(given), rms(found)),
         predictive_gain(given, found), against,
         parameters=fitted.parameters(drive, start.units_of(drive).effort), curve=fitted,
         remarks=tuple(remarks))
@@ -467,7 +448,7 @@ class AdoptionRun(JsonRecord):
     Parameters
     ----------
     steps : tuple of Adoption
-        Answers, effect by effect; refused ones come last.
+        Answers, effect by effect.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
         Why the run ended.
     reason : str
@@ -497,9 +478,8 @@ def adopt_all(
 ) -> AdoptionRun:
     """Adopt the effects that one diagnosis reports, in the values that they have together.
 
-    What is refused is tried again after another effect was adopted. Of effects that explain the
-    recordings alike, the best is adopted as the last: it lowers the error, and which of them it is
-    another recording must show.
+    Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
+    error, and which of them it is another recording must show.
 
     Parameters
     ----------
@@ -528,38 +508,25 @@ def adopt_all(
         diagnosis = diagnose(given, recordings, (), lambda share: report('diagnosing', share),
                              reference=reference)
     rivals = {names[0] for names in diagnosis.indistinguishable}
-    open_effects = sorted(diagnosis.effects, key=lambda effect: effect.name in rivals)
     steps: list[Adoption] = []
     adopted: list[FoundEffect] = []
-    refused: list[Adoption] = []
-    while len(refused) < len(open_effects):
-        # First what was not refused beside the effects that are adopted already.
-        effect = open_effects[len(refused)]
-        report(f'adopting {effect.name}', len(adopted) / len(diagnosis.effects))
-        step = adopt(model, EffectRequest(effect.effect, effect.drives), recordings, validate,
-                     diagnosis=diagnosis, reference=reference, beside=adopted)
-        if not step.adopted:
-            refused.append(step)
-            continue
-        model = record(step)
-        steps.append(step)
-        adopted.append(effect)
-        open_effects.remove(effect)
-        refused = []
-    return AdoptionRun((*steps, *refused), *_end(diagnosis, steps, refused), model)
+    for effect in sorted(diagnosis.effects, key=lambda effect: effect.name in rivals):
+        report(f'adopting {effect.name}', len(steps) / len(diagnosis.effects))
+        steps.append(adopt(model, EffectRequest(effect.effect, effect.drives), recordings, validate,
+                           diagnosis=diagnosis, reference=reference, beside=adopted))
+        if steps[-1].adopted:
+            model = record(steps[-1])
+            adopted.append(effect)
+    return AdoptionRun(tuple(steps), *_end(diagnosis, steps), model)
 
 
-def _end(diagnosis: Diagnosis, steps: Sequence[Adoption], refused: Sequence[Adoption],
-         ) -> tuple[str, str]:
+def _end(diagnosis: Diagnosis, steps: Sequence[Adoption]) -> tuple[str, str]:
     """Return how a run ends, and why."""
-    if refused:
-        return REFUSED, '; '.join(f'{step.effect}: {step.reason}' for step in refused)
+    if refused := [f'{step.effect}: {step.reason}' for step in steps if not step.adopted]:
+        return REFUSED, '; '.join(refused)
     if steps and steps[-1].rivals:
         return AMBIGUOUS, (f'{listed(steps[-1].rivals, "or")} explains these recordings as well as '
                            f'{steps[-1].effect}. Another motion separates them')
-    if diagnosis.verdict != 'unknown':
-        return 'adequate', 'the remaining error does not differ from noise'
-    return 'unknown', (
-        f'no effect of the catalogue explains what remains: {diagnosis.depends_on[0].text}'
-        if diagnosis.depends_on else
-        'the remaining error is larger than the noise, and no effect is supported')
+    if diagnosis.verdict == 'unknown':
+        return 'unknown', 'no effect of the catalogue explains what remains'
+    return 'adequate', 'the remaining error does not differ from noise'
