@@ -72,12 +72,12 @@ def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Pat
     assert moment.std < 0.002
     assert abs(moment.value + 0.25) < 4 * moment.std
     assert adoption.to_dict()['moments']['moment_z']['unit'] == 'kg m'
-    rows = dict(parameter_rows(adoption))
-    assert rows['moment_z'].startswith('-0.2')
-    assert rows['moment_z'].endswith('kg m')
+    (_, values), = parameter_rows(adoption)
+    assert 'moment_z -0.2' in values
+    assert values.endswith('kg m')
     # Where the mass is as sure, mass and centre say it.
     quick = adopt(model, requested('payload_mass', model), [record(adoption.after)])
-    assert 'moment_z' not in dict(parameter_rows(quick))
+    assert 'moment_z' not in dict(parameter_rows(quick))['payload_mass']
 
 
 def test_the_interval_of_a_mass_has_every_centre_that_the_path_allows(tmp_path: Path) -> None:

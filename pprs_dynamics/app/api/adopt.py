@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -34,13 +33,12 @@ from pprs_dynamics.inference.adoption.adopt import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.quantities import (
-    as_fitted,
     in_unit,
     measured,
     with_drives,
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.sentences import sure_moments
+from pprs_dynamics.inference.diagnosis.sentences import word_values
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -55,20 +53,13 @@ MOST_REMARKS = 2
 
 
 def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
-    """Return each parameter that is not 0, and its value ± two standard deviations.
+    """Return each drive, or the effect, with its values ± two standard deviations.
 
-    With first moments of bodies that are sure where the mass is not. A curve has a picture.
+    A curve has a picture.
     """
-    if answer.curve is not None:
-        return []
-    effect = answer.request.effect
-    scales = {parameter.name: parameter.scale for parameter in effect.parameters}
-    rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
-                            scales.get(effect.place_and_parameter(key)[1], inf)))
-            for key, parameter in answer.parameters.items() if parameter.value != 0.0]
-    return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
-        (parameter.name, answer.moments[parameter.name])
-        for parameter in sure_moments(effect, answer.parameters, answer.moments))]
+    values = {} if answer.curve is not None else word_values(
+        answer.request.effect, answer.parameters, answer.moments, answer.before.drives)
+    return [(drive or answer.effect, text) for drive, text in values.items()]
 
 
 class RefusedError(PprsError, ValueError):
@@ -150,7 +141,7 @@ class AdoptionResult(Result):
         return stacked(
             verdict_panel(word, colour, self.headline), *errors,
             f'  noise: {in_unit(answer.noise_floor, answer.unit)}',
-            *(f'  {escape(key)} = {escape(text)}' for key, text in rows[:MOST_SHOWN]),
+            *(f'  {escape(key)}: {escape(text)}' for key, text in rows[:MOST_SHOWN]),
             *more[:len(rows) > MOST_SHOWN],
             *(f'[yellow]![/] {escape(remark)}' for remark in answer.remarks[:MOST_REMARKS]))
 
@@ -187,7 +178,7 @@ class AdoptionResult(Result):
                 self.inputs.files, model=saved_as).command('diagnose', held_out=True))
         page.bullets(answer.remarks)
         if rows := parameter_rows(answer):
-            page.table(('parameter', 'value ± two standard deviations'), rows,
+            page.table(('drive', 'values ± two standard deviations'), rows,
                        caption='Fitted values')
         forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
                   if isinstance(effect, CatalogueEffect) and effect.name in after.parts}

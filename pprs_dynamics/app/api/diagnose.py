@@ -41,14 +41,13 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     Sentences,
     detectable_rows,
-    fitted_values,
-    is_refit,
     largest_fall,
     runner_up,
     set_rows,
     unexplained_groups,
     word_detectable,
     word_diagnosis,
+    word_values,
 )
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
@@ -63,7 +62,6 @@ MOST_PLACES = 2  # of an unexplained error without --details
 HEADINGS = 'effect', 'on', 'error', 'held out [std]', 'evidence'
 CAPTION = ('Effects, largest error reduction first. Error: on the drive where it falls most. '
            'Held out: standard errors by which held-out data are predicted better.')
-REFIT = 'model numbers'  # refitted together with the effects
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
 METHOD = (
@@ -180,16 +178,12 @@ def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """Return a row for each reported effect, and one for the model's numbers if they matter."""
-    rows: list[tuple[str, ...]] = [
+    """Return a row for each reported effect."""
+    return [
         (effect.name, sites(effect.drives, diagnosis, effect.places),
          _fall(diagnosis, diagnosis.remaining + effect.force, diagnosis.remaining),
          plain(effect.held_out_certainty, 2), f'{effect.evidence:.0f}')
         for effect in diagnosis.effects]
-    if is_refit(diagnosis):
-        refit = sum((effect.force for effect in diagnosis.effects), diagnosis.remaining)
-        rows.append((REFIT, '', _fall(diagnosis, diagnosis.residuals.error, refit), '', ''))
-    return rows
 
 
 def _fall(diagnosis: Diagnosis, error: Array, less: Array) -> str:
@@ -200,11 +194,9 @@ def _fall(diagnosis: Diagnosis, error: Array, less: Array) -> str:
 
 def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return effect, drive and fitted values, a row for each effect and drive."""
-    rows: dict[tuple[str, str], list[str]] = {}
-    for value in fitted_values(diagnosis):
-        rows.setdefault((value.effect, value.drive), []).append(
-            f'{value.parameter.symbol} {value.text}')
-    return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
+    return [(effect.name, drive, text) for effect in diagnosis.effects
+            for drive, text in word_values(effect.effect, effect.parameters, effect.moments,
+                                           diagnosis.residuals.drives).items()]
 
 
 def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:

@@ -221,7 +221,8 @@ class _Case:
             'noise_floors': self.diagnosis.noise_floors,
             'objections': (*objections, *(against or self.objections(
                 gain, held_out, self.held_out, before.unit))),
-            'reason': f'the error on {self.held_out} {change(held_out[0], held_out[1], before.unit)}',
+            'reason': (f'the error on {self.held_out} '
+                       + change(held_out[0], held_out[1], before.unit)),
             'reference': () if self.reference is None else self.reference.names, **details})
 
 

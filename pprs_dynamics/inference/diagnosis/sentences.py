@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import isnan
+from dataclasses import dataclass
+from math import inf, isnan
+from types import MappingProxyType
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
-    Drives,
     FoundEffect,
     RankedSet,
     RivalEffect,
@@ -43,11 +42,9 @@ from pprs_dynamics.inference.search.candidates import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
-MOST_CHANGED = 4  # values of an effect of the input model that a sentence compares
-MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
+MOST_LISTED = 2  # drives whose values a sentence gives
 LEAST_TERM = 0.05  # of a cost, that one digit shows
 WHOLE = 20  # difference of costs from which it is rounded to a whole number
 VAGUE = 0.1  # relative uncertainty of a mass, beyond which its first moment is given if surer
@@ -59,8 +56,6 @@ ALIKE_PACE = 1.25
 COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')  # named as detectable
 LEAST_SHARE = 0.005  # of an error, which is printed as 1 %
 MOST_PLACES = 2  # of an unexplained error in the headline
-MOST_SHARED = 2  # effects that a set has in common with the reported one, and are named
-LEAST_REFIT = 0.01  # share of the error by which refitted numbers matter
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -85,28 +80,6 @@ class Finding:
     confirm: str
     mark: str = ''
     remarks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class FittedValue:
-    """A fitted parameter of an effect; `drive` may be '', `given` is the input model's value."""
-
-    effect: str
-    drive: str
-    parameter: Parameter
-    estimate: Estimate
-    given: float | None = None
-
-    @property
-    def size(self) -> float:
-        """The larger of both values, which decides their unit."""
-        return max(abs(self.estimate.value), abs(self.given or 0.0))
-
-    @property
-    def text(self) -> str:
-        """Value with uncertainty and unit."""
-        return as_fitted(self.estimate.value, self.estimate.std, self.estimate.unit,
-                         self.parameter.scale, self.size)
 
 
 @dataclass(frozen=True)
@@ -151,8 +124,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     rivals : sequence of RivalEffect, optional
         As `rival_effects` returns them.
     """
-    following, command = next_step(diagnosis, files)
-    headline = _headline(diagnosis)
+    headline, drives = _headline(diagnosis), diagnosis.residuals.drives
     if diagnosis.since and diagnosis.since.covered >= HARDLY:
         headline = (f'Since {listed(diagnosis.since.recordings)}: '
                     f'{headline[:1].lower()}{headline[1:]}')
@@ -161,42 +133,72 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
-        tuple(with_drives(suspect.name, suspect.drives, diagnosis.residuals.drives)
-              + f': possible, but it costs {-suspect.evidence:.1f} more than it explains. A longer '
-              'recording decides' for suspect in diagnosis.suspects),
+        tuple(f'{with_drives(suspect.name, suspect.drives, drives)}: possible, but it costs '
+              f'{-suspect.evidence:.1f} more than it explains. A longer recording decides'
+              for suspect in diagnosis.suspects),
         (*(f'{_title(diagnosis, effect)}: not reported, because {effect.objection}'
            for effect in diagnosis.unconfirmed),
-         *(f'{_against_best(diagnosis, ranked)}: excluded, because {ranked.barred}. This set '
-           f'{_cost(ranked)}' for ranked in diagnosis.barred)),
+         *(f'{_set(diagnosis, ranked)}: excluded, because {ranked.barred}. This set {_cost(ranked)}'
+           for ranked in diagnosis.barred)),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
-        diagnosis.warnings, following, command, word_reference(diagnosis.since))
-
-
-def is_refit(diagnosis: Diagnosis) -> bool:
-    """Return whether the refitted numbers of the model alone change the error visibly."""
-    given = root_mean_square(diagnosis.residuals.error)
-    return abs(diagnosis.refit - given) > LEAST_REFIT * given
+        diagnosis.warnings, *next_step(diagnosis, files), word_reference(diagnosis.since))
 
 
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
-    """Return the unexplained statements in groups, which a reader looks at together.
-
-    One pattern on several drives, and patterns over one variable on the same drives.
-    """
-    patterns: dict[object, list[Statement]] = {}
+    """Return the unexplained statements in groups: one pattern on several drives each."""
+    groups: dict[object, list[Statement]] = {}
     for statement in diagnosis.depends_on:
         key = (statement.variable, statement.kind, statement.range)
-        patterns.setdefault(key, []).append(statement)
-    groups: dict[object, list[Statement]] = {}
-    for alike in patterns.values():
-        drives = tuple(statement.drive for statement in alike)
-        groups.setdefault((drives, alike[0].variable), []).extend(alike)
+        groups.setdefault(key, []).append(statement)
     return [tuple(group) for group in groups.values()]
 
 
-def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
-    """Return all fitted parameters that are not 0, effect by effect, drive by drive."""
-    return [value for effect in diagnosis.effects for value in _fitted(diagnosis, effect)]
+def word_values(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
+                moments: Mapping[str, Estimate], drives: Sequence[str],
+                given: Mapping[str, float] = MappingProxyType({})) -> dict[str, str]:
+    """Return the values of an effect that are not 0, by drive; '' for those of no drive.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    parameters, moments : mapping of str to Estimate
+    drives : sequence of str
+        All drives, in their order.
+    given : mapping of str to float, optional
+        Values of the input model that are compared with them.
+    """
+    known = {parameter.name: parameter for parameter in effect.parameters}
+    order = ['', *drives]
+    texts: dict[str, list[str]] = {}
+    for key, estimate in parameters.items():
+        drive, name = effect.place_and_parameter(key)
+        before, parameter = given.get(key), known[name]
+        if estimate.value or before:
+            size = max(abs(estimate.value), abs(before or 0.0))
+            text = as_fitted(estimate.value, estimate.std, estimate.unit, parameter.scale, size)
+            if before is not None:
+                text += f' (model: {with_uncertainty(before, 0.0, estimate.unit, size)})'
+            texts.setdefault(drive, []).append(f'{parameter.symbol} {text}')
+    texts.setdefault('', []).extend(
+        f'{name} {with_uncertainty(moments[name].value, moments[name].std, moments[name].unit)}'
+        for name in sure_moments(effect, parameters, moments))
+    return {drive: ', '.join(texts[drive]) for drive in sorted(
+        texts, key=lambda drive: order.index(drive) if drive in order else len(order))
+        if texts[drive]}
+
+
+def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
+                 moments: Mapping[str, Estimate]) -> list[str]:
+    """Return first moments, and combinations with the mass, that are sure where a mass is not."""
+
+    def is_vague(estimate: Estimate) -> bool:
+        return INTERVAL * estimate.std > VAGUE * abs(estimate.value)
+
+    known = {coefficient.name for coefficient in effect.coefficients}
+    masses = {key: 'mass' if key not in known else f'{key.rpartition("moment_")[0]}mass'
+              for key in moments}
+    return [key for key, mass in masses.items() if mass in parameters
+            and is_vague(parameters[mass]) and not is_vague(moments[key])]
 
 
 def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
@@ -220,18 +222,13 @@ def word_detectable(diagnosis: Diagnosis) -> str:
 
 
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
-    return _names(diagnosis, Counter(ranked.names)) or 'nothing missing'
-
-
-def _names(diagnosis: Diagnosis, names: Counter[tuple[str, Drives]]) -> str:
-    """Return effects and patterns with their drives; patterns over one variable are counted."""
+    """Return the effects and patterns of a set with their drives."""
     found = []
-    for (name, drives), count in names.items():
+    for name, drives in ranked.names:
         unknown, _, variable = name.partition(', ')
-        found.append(with_drives(
-            pattern_over(variable, count) if variable and unknown == 'unknown' else name,
-            drives, diagnosis.residuals.drives))
-    return ' + '.join(found)
+        found.append(with_drives(pattern_over(variable) if variable and unknown == 'unknown'
+                                 else name, drives, diagnosis.residuals.drives))
+    return ' + '.join(found) or 'nothing missing'
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
@@ -240,22 +237,11 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     Of sets that differ in shapes only the cheapest.
     """
     rows: dict[str, tuple[str, str, str]] = {}
-    for number, fitted in enumerate(diagnosis.sets):
-        text = _against_best(diagnosis, fitted) if number else _set(diagnosis, fitted)
-        rows.setdefault(text, (text, _rise(fitted.cost) if number else 'the best',
-                               word_terms(fitted.terms)))
+    for number, ranked in enumerate(diagnosis.sets):
+        text = _set(diagnosis, ranked)
+        rows.setdefault(text, (text, _rise(ranked.cost) if number else 'the best',
+                               word_terms(ranked.terms)))
     return list(rows.values())
-
-
-def _against_best(diagnosis: Diagnosis, ranked: RankedSet) -> str:
-    """Return a set in words; one that is much like the reported set by its difference."""
-    best = Counter(diagnosis.sets[0].names if diagnosis.sets else ())
-    names = Counter(ranked.names)
-    if (names & best).total() <= MOST_SHARED or names == best:
-        return _set(diagnosis, ranked)
-    less, more = _names(diagnosis, best - names), _names(diagnosis, names - best)
-    return 'the reported set' + (f' without {less}' if less else '') + (
-        f'{", but" if less else ""} with {more}' if more else '')
 
 
 def word_terms(terms: CostTerms) -> str:
@@ -270,8 +256,6 @@ def _rise(cost: float) -> str:
 
 
 def _cost(ranked: RankedSet) -> str:
-    if abs(ranked.cost) < 0.5:
-        return 'costs as much'
     return f'costs {_rise(ranked.cost)[1:]} {"less" if ranked.cost < 0 else "more"}'
 
 
@@ -283,7 +267,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
     best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
     others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
     others.sort(key=lambda ranked: best <= set(ranked.names))
-    return (f'{_against_best(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
+    return (f'{_set(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
             if others else '')
 
 
@@ -325,56 +309,49 @@ def _headline(diagnosis: Diagnosis) -> str:
         return f'{sentence(little)} No effect of the catalogue explains the rest.'
     residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
     is_noise = residual <= AT_NOISE * diagnosis.noise_floor
-    lacking = _lacking(diagnosis)
     if diagnosis.unconfirmed and not effects and not diagnosis.depends_on:
         return 'No effect is supported by held-out data.' + ('' if is_noise else (
             f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
-    where = [place_on(group) for group in unexplained_groups(diagnosis)]
-    places = where[:MOST_PLACES] or [f'the error of {drive} is {ratio:.1f} times its noise'
-                                     for drive, ratio in diagnosis.above_noise.items()]
+    places = [place_on(group) for group in unexplained_groups(diagnosis)] or [
+        f'the error of {drive} is {ratio:.1f} times its noise'
+        for drive, ratio in diagnosis.above_noise.items()]
     if places:
-        if more := len(where[MOST_PLACES:]):
-            places.append(f'in {more} more place{"s" * (more > 1)}')
-        return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
-                + (f' In addition, {lacking}.' if effects else ''))
+        more = ', and more' * (len(places) > MOST_PLACES)
+        return ('An error remains that no effect of the catalogue explains: '
+                f'{listed(places[:MOST_PLACES])}{more}.'
+                + (f' {_lacking(diagnosis)}.' if effects else ''))
     unseen = (f'the recording does not show how much of the error of '
               f'{listed(diagnosis.unseen_noise)} is noise') if diagnosis.unseen_noise else ''
-    if not effects:
-        return f'No effect is reported: {unseen}.' if unseen and not diagnosis.since else (
-            f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
+    if effects:
+        level = (f'; {unseen}' if unseen else ', which is the noise' if is_noise
+                 else f'; the noise is {noise}')
+        fall = change(root_mean_square(diagnosis.residuals.error), residual, unit)
+        return (f'{_lacking(diagnosis)}. With {"it" if len(effects) == 1 else "them"} the error '
+                f'{fall}{level}.')
+    if unseen and not diagnosis.since:
+        return f'No effect is reported: {unseen}.'
+    return (f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
             f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
-    level = (f'; {unseen}.' if unseen else ', which is the noise.' if is_noise
-             else f'; the noise is {noise}.')
-    begin = lacking[:1].upper() if lacking.startswith('the model') else lacking[:1]
-    refitted = ' and refitted numbers of the model' * is_refit(diagnosis)
-    fall = f'With {"it" if len(effects) == 1 else "them"}{refitted} the error ' + change(
-        root_mean_square(diagnosis.residuals.error), residual, unit)
-    return f'{begin}{lacking[1:]}. {fall}{level}'
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
     """Return the sentence on missing effects and on values that the data contradict."""
-    new = []
-    for effect in diagnosis.effects:
-        if not effect.in_model:
-            rivals = listed(_rivals(diagnosis, effect), 'or')
-            new.append(_title(diagnosis, effect)
-                       + (f' (or {rivals}: the data do not separate these)' if rivals else ''))
-    return '; '.join([*([f'the model lacks {listed(new)}'] if new else []), *(
+    new = [f'{_title(diagnosis, effect)}{_or_rivals(diagnosis, effect)}'
+           for effect in diagnosis.effects if not effect.in_model]
+    return '; '.join([*([f'The model lacks {listed(new)}'] if new else []), *(
         _otherwise(diagnosis, effect) for effect in diagnosis.effects if effect.in_model)])
 
 
 def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    """Return the input model's values of an effect and those of the recordings."""
-    fitted = [value for value in _fitted(diagnosis, effect) if value.given is not None]
-    values = ', '.join(
-        f'{value.parameter.symbol} '
-        f'{with_uncertainty(value.given or 0.0, 0.0, value.estimate.unit, value.size)}'
-        f'{f" on {value.drive}" if value.drive else ""} (this recording: {value.text})'
-        for value in fitted[:MOST_CHANGED])
-    rivals = _rivals(diagnosis, effect)
-    other = f', or the model lacks {listed(rivals, "or")}' if rivals else ''
-    return f'{_title(diagnosis, effect)} is in the model with {values}{other}'
+    """Return the values of an effect that the input model has, next to the model's."""
+    return (f'{_title(diagnosis, effect)} is in the model with other values: '
+            f'{"; ".join(_values(diagnosis, effect).values())}{_or_rivals(diagnosis, effect)}')
+
+
+def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
+    rivals = listed([name.replace(':', ' on ') for names in diagnosis.indistinguishable
+                     if names[0] == effect.name for name in names[1:]], 'or')
+    return f' (or {rivals}: the data do not separate these)' if rivals else ''
 
 
 # Findings
@@ -387,16 +364,15 @@ def _title(diagnosis: Diagnosis, effect: FoundEffect) -> str:
             with_drives(effect.name, effect.drives, diagnosis.residuals.drives)) + effect.when
 
 
-def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
-    return [name.replace(':', ' on ') for names in diagnosis.indistinguishable
-            if names[0] == effect.name for name in names[1:]]
+def _values(diagnosis: Diagnosis, effect: FoundEffect) -> dict[str, str]:
+    return word_values(effect.effect, effect.parameters, effect.moments,
+                       diagnosis.residuals.drives, effect.in_model)
 
 
 def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
-    card = effect.effect.card
-    title, is_validated = _title(diagnosis, effect), diagnosis.held_out_on == 'validation'
-    what = (_otherwise(diagnosis, effect) if effect.in_model else
-            f'The model lacks {title}: {_parameters(diagnosis, effect)}')
+    card, is_validated = effect.effect.card, diagnosis.held_out_on == 'validation'
+    what = _otherwise(diagnosis, effect) if effect.in_model else (
+        f'The model lacks {_with_values(diagnosis, effect)}{_or_rivals(diagnosis, effect)}')
     if issubclass(effect.effect, MeasurementEffect):
         what += '. It describes the sensor, and is never used in a command'
     data = 'the --validate recordings' if is_validated else 'held-out blocks of the recordings'
@@ -408,19 +384,25 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
     why += f'Evidence {effect.evidence:.0f} (threshold 0)'
     why += '.' if effect.without is None else (
         f'; the best set without it: {_set(diagnosis, effect.without)}.')
-    return Finding(title, f'{what}.', why, sentence(card.causes), sentence(card.confirm),
-                   sentence(card.looks_like), tuple(_remarks(diagnosis, effect)))
+    return Finding(_title(diagnosis, effect), f'{what}.', why, sentence(card.causes),
+                   sentence(card.confirm), sentence(card.looks_like), tuple(_remarks(effect)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    found = rival.found
-    card, title = found.effect.card, _title(diagnosis, found)
+    card = rival.found.effect.card
     return Finding(
-        f'or {title}', f'{title} explains the data about as well as {rival.of}: '
-        f'{_parameters(diagnosis, found)}.',
-        f'{_with_it(diagnosis, found, rival.remaining)}The set costs {plain(rival.cost, 2)} more '
-        'than the best one.', sentence(card.causes), sentence(card.confirm),
-        sentence(card.looks_like))
+        f'or {_title(diagnosis, rival.found)}', f'{_with_values(diagnosis, rival.found)} explains '
+        f'the data about as well as {rival.of}.',
+        f'{_with_it(diagnosis, rival.found, rival.remaining)}The set costs '
+        f'{plain(rival.cost, 2)} more than the best one.', sentence(card.causes),
+        sentence(card.confirm), sentence(card.looks_like))
+
+
+def _with_values(diagnosis: Diagnosis, effect: FoundEffect) -> str:
+    """Return the title of an effect with its values; of many drives the table has these."""
+    values = list(_values(diagnosis, effect).values())
+    return _title(diagnosis, effect) + (
+        f' ({"; ".join(values)})' if len(values) <= MOST_LISTED else '')
 
 
 def _with_it(diagnosis: Diagnosis, effect: FoundEffect, remaining: Array) -> str:
@@ -445,71 +427,12 @@ def largest_fall(diagnosis: Diagnosis, error: Array, less: Array) -> tuple[str, 
     return max(falls)[1:]
 
 
-def _parameters(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    """Return the fitted values; of more than two drives the least and the largest."""
-    fitted = _fitted(diagnosis, effect)
-    count = len({value.drive for value in fitted})
-    phrases = []
-    for parameter in dict.fromkeys(value.parameter for value in fitted):
-        mine = [value for value in fitted if value.parameter == parameter]
-        if count > MOST_LISTED and len(mine) > 1:
-            mine.sort(key=lambda value: value.estimate.value)
-            texts = ' to '.join(f'{value.text} ({value.drive})' for value in (mine[0], mine[-1]))
-        else:
-            texts = ', '.join(value.text + (f' on {value.drive}' if count > 1 else '')
-                              for value in mine)
-        phrases.append(f'{parameter.description} ({parameter.symbol}) {texts}')
-    return ', '.join(phrases)
-
-
-def _fitted(diagnosis: Diagnosis, effect: FoundEffect) -> list[FittedValue]:
-    """Return the fitted parameters of an effect that are not 0, in the order of drives."""
-    known = {parameter.name: parameter for parameter in effect.effect.parameters}
-    order = ['', *diagnosis.residuals.drives]
-    values = []
+def _remarks(effect: FoundEffect) -> Iterator[str]:
     for key, estimate in effect.parameters.items():
         drive, name = effect.effect.place_and_parameter(key)
-        given = effect.in_model.get(key)
-        if estimate.value or given:
-            values.append(FittedValue(effect.name, drive, known[name], estimate, given))
-    values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
-               for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
-    return sorted(values, key=lambda value: (value.drive not in order, (
-        order.index(value.drive) if value.drive in order else 0)))
-
-
-def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
-                 moments: Mapping[str, Estimate]) -> list[Parameter]:
-    """Return first moments, and combinations with the mass, that are sure where a mass is not."""
-
-    def is_vague(estimate: Estimate) -> bool:
-        return INTERVAL * estimate.std > VAGUE * abs(estimate.value)
-
-    known = {coefficient.name: coefficient for coefficient in effect.coefficients}
-    found = []
-    for key, moment in moments.items():
-        name = 'mass' if key not in known else f'{key.rpartition("moment_")[0]}mass'
-        if name in parameters and is_vague(parameters[name]) and not is_vague(moment):
-            found.append(known.get(key) or replace(known[name], name=key))
-    return found
-
-
-def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
-    if rivals := _rivals(diagnosis, effect):
-        yield f'The data do not separate {effect.name} from {listed(rivals, "or")}.'
-    for value in _fitted(diagnosis, effect):
-        if value.estimate.value < effect.effect.unphysical_below.get(
-                value.parameter.name, -float('inf')):
-            yield (f'{value.parameter.description} is negative'
-                   f'{f" on {value.drive}" if value.drive else ""}, {value.text}. This is '
-                   'impossible: the model has too much of it, or another effect looks like it.')
-    for names in effect.places:
-        if len(names) > 1:
-            yield (f'No motion separates {names[0]} from {listed(names[1:], "or")}, because they '
-                   'move alike.')
-    if effect.effect is AsymmetricFriction:
-        yield ('Its dry part equals coulomb_friction of the mean of both directions plus '
-               'effort_offset of half their difference. Only a reading at rest separates them.')
+        if estimate.value < effect.effect.unphysical_below.get(name, -inf):
+            yield (f'{name}{f" on {drive}" if drive else ""} is negative. This is impossible: the '
+                   'model has too much of it, or another effect looks like it.')
     if effect.at_bound:
         yield (f'The value of {listed(effect.at_bound)} is at the limit of the values that were '
                'tried; the true one may be beyond.')
@@ -519,9 +442,7 @@ def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
     moved = (f'{number.label}: {with_uncertainty(number.value, 0.0, number.unit)} becomes '
              f'{with_uncertainty(number.after, number.std, number.unit)}')
     tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
-    if not tolerance:
-        return moved
-    is_within = (abs(number.after - number.value)
-                 <= tolerance * abs(number.value) + INTERVAL * number.std)
-    return (f'{moved} (tolerance {tolerance:.0%})' if is_within else
-            f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first')
+    if tolerance and abs(number.after - number.value) > (
+            tolerance * abs(number.value) + INTERVAL * number.std):
+        return f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first'
+    return moved
