@@ -211,7 +211,7 @@ class ComparisonResult(Result):
         if other and not self.inputs.as_it_is:
             return measure_first(other, self.inputs.files)
         if self.comparison.little:
-            return first_step(self.inputs.model, self.inputs.files, next(iter(self.where), None))
+            return first_step(self.inputs.model, self.inputs.files)
         return ('Find out which physical effect is missing',
                 self.inputs.files.command('diagnose', '--report', 'why.html'))
 

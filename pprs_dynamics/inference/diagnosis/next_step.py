@@ -22,7 +22,6 @@ from pprs_dynamics.physics.model.parameter_values import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-    from pprs_dynamics.inference.diagnosis.statements import Statement
     from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -75,42 +74,20 @@ class GivenFiles:
         return shlex.join([*given, *words[first:]])
 
     def output(self, name: str) -> str:
-        """Return the name of a model file to write, which may not be the one that is given.
-
-        `with_NAME.yaml` after itself is `with_NAME_2.yaml`, and so on.
-        """
+        """Return the name of a model file to write, which may not be the one that is given."""
         given, new = Path(self.model), Path(name)
-        stem, _, number = given.stem.rpartition('_')
-        if given.absolute().parent != new.absolute().parent:
-            return name
-        if given.stem == new.stem:
-            return f'{new.stem}_2{new.suffix}'
-        if stem == new.stem and number.isdecimal():
-            return f'{new.stem}_{int(number) + 1}{new.suffix}'
-        return name
+        return name if given.absolute() != new.absolute() else f'{new.stem}_2{new.suffix}'
 
 
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made from memory
 
 
-def first_step(model: DriveModel, files: GivenFiles, worst: Statement | None = None,
-               ) -> tuple[str, str]:
+def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
     """Return the first step where a model explains little, and its command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
-
-    Parameters
-    ----------
-    model : DriveModel
-    files : GivenFiles
-    worst : Statement, optional
-        What explains most of the squared error.
     """
-    is_fitted = bool(reference_files(model.values, model.source))
-    if not model.has_links or is_fitted:
-        if worst is not None and worst.kind == 'friction':
-            return ('Find out which effect explains this error by friction',
-                    files.command('diagnose', '--report', 'why.html'))
+    if not model.has_links or reference_files(model.values, model.source):
         return CHECK, files.command('info')
     words = ('The model has no friction yet. Fit inertia and friction first'
              if _has_no_friction(model) else f'{CHECK}. Then fit the model')
@@ -154,14 +131,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     if changing := [f'{effect.name}{effect.when}' for effect in effects if effect.course]:
         return (f'Find out what happened to the machine ({"; ".join(changing)}). Then record it in '
                 'its present state, and diagnose that recording alone', other)
-    if diagnosis.depends_on:
-        curve = None if is_change else _curve(diagnosis)
-        if curve is not None:
-            return ('Look at that place on the machine. A measured curve compensates the error '
-                    'until the cause is known', files.command(
-                        'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
-        return f'Look at that place on the machine. {REPEAT}', both
-    if diagnosis.above_noise:
+    if diagnosis.depends_on and not is_change and (curve := _curve(diagnosis)) is not None:
+        return ('Look at that place on the machine. A measured curve compensates the error until '
+                'the cause is known', files.command(
+                    'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
+    if diagnosis.depends_on or diagnosis.above_noise:
         return REPEAT, both
     if diagnosis.verdict == 'ambiguous':
         if all(_need_another_load(names) for names in diagnosis.indistinguishable):
@@ -174,12 +148,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 'another motion, and diagnose both recordings', both)
     if len(effects) == 1:
         name = effects[0].name
-        step = 'set it to the new values, or remove it' if effects[0].in_model else 'add it'
-        return f'Confirm it on the machine, then {step}', files.command(
+        return 'Confirm it on the machine, then adopt it', files.command(
             'adopt', name, '--output', files.output(f'with_{name}.yaml'), held_out=True)
     if effects:
-        return ('Confirm them on the machine, then add them', files.command(
-            'diagnose', '--adopt-all', '--output', files.output('better.yaml'), held_out=True))
+        return 'Confirm them on the machine, then adopt them', files.command(
+            'diagnose', '--adopt-all', '--output', files.output('better.yaml'), held_out=True)
     if diagnosis.suspects:
         return REPEAT, both
     return 'Nothing to add. Another motion may excite other effects', other

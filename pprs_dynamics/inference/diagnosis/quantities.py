@@ -17,8 +17,6 @@ PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s�
 # Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
 ANYTHING = 100.0
 RESOLVED = 1e-9  # of any quantity in SI units, below which a number is rounding
-MOST_LITTLE = 3  # drives of whose effort little is explained, in a sentence
-COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
 def with_uncertainty(value: float, std: float, unit: str, size: float | None = None) -> str:
@@ -137,27 +135,14 @@ def word_little(little: Mapping[str, float], after: str = '') -> str:
     after : str, optional
         Words after 'the model', e.g. ' with the reported effects'.
     """
-    if not little:
-        return ''
-    said = [f'{_of_effort(share)} of the effort of {name}' if not place else
-            f'{_of_effort(share)} of that of {name}'
-            for place, (name, share) in enumerate(list(little.items())[:MOST_LITTLE])]
-    if (more := len(little) - MOST_LITTLE) > 0:
-        said.append(f'less than half of that of {more} more')
-    return f'the model{after} explains {listed(said)}'
-
-
-def _of_effort(share: float) -> str:
-    return 'nothing' if share < 0.005 else f'{100 * share:.0f}%'
+    shares = [f'{max(share, 0.0):.0%} of the effort of {name}' for name, share in little.items()]
+    return f'the model{after} explains {listed(shares)}' if shares else ''
 
 
 def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:
-    """Return the name of a set of drives: all six drives, all three lifts, lift_1 and lift_3."""
-    kinds = {'drives': list(every), **{f'{kind}s': [d for d in every if d.startswith(f'{kind}_')]
-                                       for kind in ('slide', 'lift')}}
-    for kind, alike in kinds.items():
-        if 2 < len(alike) < len(COUNTS) and set(drives) == set(alike):
-            return f'all {COUNTS[len(alike)]} {kind}'
+    """Return the names of drives: lift_1 and lift_3, all 6 drives."""
+    if 2 < len(every) == len(drives):
+        return f'all {len(every)} drives'
     return listed([name for name in every if name in drives])
 
 

@@ -156,44 +156,37 @@ def word_statement(
         # pattern has beside the others that overlap it.
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
     size = float(np.linalg.norm(coefficients))
-    text = _sentence(variable, pattern, drive_patterns, signed, size, share, time, shape)
-    return Statement(drive, variable, limits, share, time, f'{drive}: {text}', evidence,
-                     pattern.kind, float(np.mean(shape ** 2)))
+    when = f' in {percent(time)} of the time' if pattern.limits else ''
+    text = (f'{drive}: {_clause(variable, pattern, drive_patterns, signed, size, shape)} '
+            f'({percent(share)} of its squared error{when})')
+    return Statement(drive, variable, limits, share, time, text, evidence, pattern.kind,
+                     float(np.mean(shape ** 2)))
 
 
-def _sentence(
-    variable: str, pattern: Pattern, drive_patterns: DrivePatterns, signed: float, amplitude: float,
-    share: float, time: float, shape: Array,
-) -> str:
+def _clause(variable: str, pattern: Pattern, drive_patterns: DrivePatterns, signed: float,
+            amplitude: float, shape: Array) -> str:
+    """Return what a pattern says of the error of its drive, of size in the drive's unit."""
     kind, residuals = pattern.kind, drive_patterns.residuals
     units = residuals.units_of(residuals.drives[drive_patterns.d])
-    effort, size = units.effort, plain(amplitude, SHOWN)
-    of = f'{percent(share)} of its squared error'
+    effort, shifted = units.effort, f'{with_sign(signed, SHOWN)} {units.effort}'
+    size = f'{plain(amplitude, SHOWN)} {effort}'
+    along = ' in the direction of motion' if kind in (
+        'directed_growth', 'directed_range', 'fading', CURVE) else ''
     if kind == 'offset':
-        return f'its mean error is {with_sign(signed, SHOWN)} {effort} ({of})'
+        return f'its mean error is {shifted}'
     if kind == 'friction':
-        amount = 'little' if signed > 0 else 'much'
-        return (f'its error has the sign of the motion, {size} {effort} ({of}): the model has too '
-                f'{amount} friction')
+        return (f'its error has the sign of the motion, {size}: the model has too '
+                f'{"little" if signed > 0 else "much"} friction')
     if kind == 'ripple':
         factor, place = read_in('position', units)
-        return (f'its error repeats every {plain(pattern.scale * factor)} {place} of position, '
-                f'{size} {effort} ({of})')
-    if kind == CURVE:
-        return ('its error depends on position in the direction of motion, '
-                f'{plain(float(np.std(shape)), SHOWN)} {effort} rms ({of})')
+        period = f'{plain(pattern.scale * factor)} {place}'
+        return f'its error repeats every {period} of position, {size}'
     if kind == 'line':
-        return f'its error vibrates at {plain(pattern.scale, 4)} Hz, {size} {effort} ({of})'
-    if kind in ('growth', 'directed_growth'):
-        opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
-        low, high = _ends(drive_patterns, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {in_words(variable)}, from '
-                f'{with_sign(low, SHOWN)} {effort} at the lowest to {with_sign(high, SHOWN)} '
-                f'{effort} at the highest{opposed} ({of})')
-    place = _place(variable, pattern, drive_patterns)
-    of += f' in {percent(time)} of the time'
-    along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
-    return f'{place} its error is shifted by {with_sign(signed, SHOWN)} {effort}{along} ({of})'
+        return f'its error vibrates at {plain(pattern.scale, 4)} Hz, {size}'
+    if kind in (CURVE, 'growth', 'directed_growth'):
+        return (f'its error changes with {in_words(variable)}{along}, by '
+                f'{plain(float(np.ptp(shape)), SHOWN)} {effort} in all')
+    return f'{_place(variable, pattern, drive_patterns)} its error is shifted by {shifted}{along}'
 
 
 def is_of_speed(kind: str, variable: str) -> bool:
@@ -208,33 +201,16 @@ def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> st
         return 'in the positive direction' if low >= 0 else 'in the negative direction'
     of = variable.partition(' of ')[2] or drive_patterns.residuals.drives[drive_patterns.d]
     factor, unit = read_in(variable, drive_patterns.residuals.units_of(of))
-    word = in_words(variable)
-    values = drive_patterns.values(variable)
-    speed = is_of_speed(pattern.kind, variable)
-    if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
-        word = word.replace('velocity', 'speed')
-        values, low = np.abs(values), max(low, 0.0)
-    below, above = high < values.max(), low > values.min() and not (speed and low <= 0)
+    word, values = in_words(variable), drive_patterns.values(variable)
+    if is_of_speed(pattern.kind, variable) or (
+            variable.startswith('velocity') and np.isclose(-low, high)):
+        word, values, low = word.replace('velocity', 'speed'), np.abs(values), max(low, 0.0)
     word = f'an {word}' if word.startswith('a') else f'a {word}'
-    if below and (not above or (word.startswith('a speed') and low <= 0)):
-        return f'at {word} below {plain(high * factor, SHOWN)} {unit}'
-    if above and not below:
-        return f'at {word} above {plain(low * factor, SHOWN)} {unit}'
-    digits = next((n for n in range(SHOWN, 6)
-                   if plain(low * factor, n) != plain(high * factor, n)), SHOWN)
-    return (f'at {word} between {plain(low * factor, digits)} and '
-            f'{plain(high * factor, digits)} {unit}')
-
-
-def _ends(
-    drive_patterns: DrivePatterns, variable: str, shape: Array, directed: bool,
-) -> tuple[float, float]:
-    values = drive_patterns.values(variable)
-    if directed:
-        shape = shape * drive_patterns.values('direction')
-    order = np.argsort(values)
-    few = max(1, len(order) // 100)
-    return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
+    first, last = (f'{plain(end * factor)} {unit}' for end in (low, high))
+    if low <= values.min() or (low == 0 and 'speed' in word):
+        return f'at {word} below {last}'
+    return f'at {word} ' + (f'above {first}' if high >= values.max() else
+                            f'between {first} and {last}')
 
 
 def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str, str]:
@@ -259,11 +235,9 @@ def place_on(group: Sequence[Statement]) -> str:
     return f'on {listed([*drives])} ({where})'
 
 
-def pattern_over(variable: str, count: int = 1) -> str:
-    """Return the name of one or more patterns of no catalogue, for a list of sets."""
-    noun, over = ('vibration', '') if variable == 'frequency' else (
-        'pattern', f' over {in_words(variable)}')
-    return (f'a {noun}' if count == 1 else f'{count} {noun}s') + over
+def pattern_over(variable: str) -> str:
+    """Return the name of a pattern of no catalogue, for a list of sets."""
+    return 'a vibration' if variable == 'frequency' else f'a pattern over {in_words(variable)}'
 
 
 def in_words(variable: str) -> str:
