@@ -17,7 +17,7 @@ from made_up_diagnosis import found_effect
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adopt import _Case
-from pprs_dynamics.inference.diagnosis.answer import on_other_drives, unconfirmed_effects
+from pprs_dynamics.inference.diagnosis.answer import unconfirmed_effects
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import (
     COURSE_TIMES,
@@ -26,7 +26,6 @@ from pprs_dynamics.inference.search.candidates import (
     SINCE,
     Component,
     Course,
-    EffectCandidate,
     PriorCosts,
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -210,17 +209,6 @@ def test_asymmetric_friction_claims_dry_and_viscous_friction_apart() -> None:
     # What claims one thing only claims as many as it has sets of coefficients.
     spring = CATALOGUE['hysteresis']
     assert len(spring.hypotheses(('force',)) | spring.hypotheses(('coefficient',))) == 2
-
-
-@pytest.mark.parametrize(('in_errors', 'kept'), [
-    ((5.0, -5.0), [0]), ((-5.0, 5.0), [1]), ((5.0, 5.0), []), ((-5.0, -5.0), [])])
-def test_an_effect_is_not_reported_on_drives_that_held_out_data_refute(
-    in_errors: tuple[float, float], kept: list[int],
-) -> None:
-    effect = CATALOGUE['effort_offset']
-    candidate = EffectCandidate.of([Component.of(effect, d, {}, ('force',)) for d in (0, 1)])
-    assert [component.drive for component in on_other_drives(
-        candidate, DRIVES, gain(*in_errors).losing)] == kept
 
 
 @pytest.mark.parametrize(('rises', 'count'), [(0.9, 0), (1.1, 2)])

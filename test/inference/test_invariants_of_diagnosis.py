@@ -118,7 +118,7 @@ def test_the_reported_set_is_the_row_of_least_cost_and_costs_add_up(name: str) -
         candidate.name for candidate in table.best.effects}
     assert costs == sorted(costs)
     assert costs[0] == 0
-    assert [name for name, _ in found.sets[0].names] == [
+    assert [effect.name for effect in found.sets[0].effects] == [
         candidate.name for candidate in table.best.fitted.candidates]
     for fitted in found.sets:
         assert sum(vars(fitted.terms).values()) == pytest.approx(fitted.cost, abs=1e-6)
@@ -215,8 +215,8 @@ def test_friction_has_the_sign_of_friction_and_is_alike_in_both_directions() -> 
     # The prior has its probability on one side, but for the odds of a wrong sign.
     assert table.best.terms.signs == pytest.approx(
         -2 * np.log(2 * (1 - DECISIONS.wrong_sign_odds)), abs=1e-3)
-    (ranked,) = diagnosed('viscous', 1).barred
-    assert 'asymmetric_friction may be the form error of friction that is the same' in ranked.barred
+    (barred,) = table_of(diagnosed('viscous', 1)).barred(DECISIONS.rival_margin)
+    assert 'asymmetric_friction may be the form error of friction that is the same' in barred.barred
 
 
 def test_rivals_have_the_values_that_explain_the_same() -> None:

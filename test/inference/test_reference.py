@@ -70,7 +70,7 @@ def test_what_was_in_the_reference_has_not_changed(machine: tuple[DriveModel, Re
     assert found.to_dict()['reference']['recordings'] == ['run_0_1']
     assert found.to_dict()['reference']['covered'] > 0.95
     assert min(found.to_dict()['reference']['explained'].values()) > 0.9
-    assert found.to_dict()['changed_since'] == []
+    assert found.effects == ()
     # The model lacks much all the same.
     assert min(rms_by_drive(measure_residuals(model, [again])[0]).values()) > 5 * NOISE
     assert max(found.diagnosis.noise_floors.values()) < 2 * NOISE
@@ -202,7 +202,7 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
     said = tmp_path / 'said.json'
     assert main(['diagnose', later, '--model', str(base), '--reference', '--json', str(said)]) == 0
     content = json.loads(said.read_text())
-    assert content['changed_since'] == ['coulomb_friction']
+    assert [effect['name'] for effect in content['effects']] == ['coulomb_friction']
     # What is written elsewhere names it from there.
     write_model(tmp_path / 'new.yaml', values, base)
     assert list(DriveModel.load(tmp_path / 'new.yaml').values['reference']) == ['free.csv']

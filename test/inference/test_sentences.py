@@ -99,7 +99,7 @@ def test_with_details_the_terminal_shows_everything_within_its_width(make: Any) 
     assert '…' not in text, 'nothing is cut off'
     shown = in_one_line(text)
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
-                     *words.barred, *words.warnings):
+                     *words.refuted, *words.warnings):
         assert sentence in shown
     for finding in (*words.effects, *words.unexplained):
         for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
@@ -125,7 +125,7 @@ def test_an_effect_that_is_not_confirmed_is_named_beside_those_that_are() -> Non
                                    unconfirmed=(refuted,))
     words = word_diagnosis(found)
     assert words.headline.startswith('The model lacks coulomb_friction on lift_2. With it the ')
-    assert words.barred == (
+    assert words.refuted == (
         'hysteresis on lift_2: not reported, because held-out data are predicted worse with it',)
     assert words.command.startswith('pprs adopt coulomb_friction')
 

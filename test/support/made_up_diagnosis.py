@@ -16,6 +16,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
     EffectAlone,
     FoundEffect,
+    NamedEffect,
     RankedSet,
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement
@@ -84,7 +85,7 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
             EffectAlone(e.name, e.drives, e.evidence, e.error_after) for e in effects),
-        'suspects': (), 'depends_on': (), 'sets': (), 'barred': (),
+        'suspects': (), 'depends_on': (), 'sets': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),
         'notes': (), 'model': model, 'adopted': model, 'residuals': given,
@@ -99,7 +100,7 @@ def white_noise() -> NoiseSpectrum:
 
 def ranked_set(names: tuple[tuple[str, tuple[str, ...] | None], ...], cost: float) -> RankedSet:
     """Return a set that costs so much more than the best, all of it for its names."""
-    return RankedSet(names, CostTerms(names=cost))
+    return RankedSet(tuple(NamedEffect(*name) for name in names), CostTerms(names=cost))
 
 
 def ranked_sets(*names: str) -> tuple[RankedSet, ...]:

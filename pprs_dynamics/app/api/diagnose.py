@@ -114,8 +114,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield f'[bold]Runner-up[/] {escape(second)}'
     if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
         yield escape(seen)
-    if words.barred:
-        yield f'[blue]i[/] {escape(words.barred[0])}'
+    if words.refuted:
+        yield f'[blue]i[/] {escape(words.refuted[0])}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
 
@@ -173,7 +173,7 @@ def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
 
 def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
     return [('Suspects: effects that cost little more than they explain', words.suspects),
-            ('Excluded', words.barred),
+            ('Not confirmed', words.refuted),
             ('Calibrated numbers of the model', words.calibrated)]
 
 
@@ -254,7 +254,7 @@ def diagnosis_page(
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
     page.folded_list('Warnings', words.warnings, is_open=True)
-    suspects, barred, calibrated = _lists(words)
+    suspects, refuted, calibrated = _lists(words)
     page.heading('Evidence')
     for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
         with page.fold(finding.title):
@@ -281,7 +281,7 @@ def diagnosis_page(
             _card(page, diagnosis, finding, rival.found, rival.remaining)
     _add_tables(page, _alternatives(diagnosis))
     page.folded_list(*suspects)
-    page.folded_list(*barred)
+    page.folded_list(*refuted)
     page.heading('Not seen, and from which size it would have been')
     if not diagnosis.detectable:
         page.text('Sizes are computed for the verdicts adequate and effect.', 'note')

@@ -184,12 +184,11 @@ class _Case:
         does_fall = errors[1] < errors[0] or not self.is_alone or unit not in EFFORT_UNITS
         if gain is not None and gain.confirms and does_fall:
             return ()
-        said = f'the error on {where} {change(errors[0], errors[1], unit)}'
         if gain is None or not does_fall:
-            return (said,)
-        rises = f'. On {listed(gain.losing)} it rises' if gain.losing else ''
-        return (f'{said}, by {gain.certainty:.2g} standard errors if weighted by the noise, and '
-                f'at least {SURE:g} must be reached{rises}',)
+            return (f'the error on {where} {change(errors[0], errors[1], unit)}',)
+        rises = f' rises on {listed(gain.losing)} and' if gain.losing else ''
+        return (f'the error on {where}{rises}, weighted by the noise, falls by '
+                f'{gain.certainty:.2g} standard errors, and at least {SURE:g} must be reached',)
 
     def adoption(self, request: EffectRequest, after: DriveModel, held_out: tuple[float, float],
                  gain: PredictiveGain | None, objections: Sequence[str], **details: Any,

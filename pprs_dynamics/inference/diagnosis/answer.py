@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -18,6 +18,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import (
     Diagnosis,
     EffectAlone,
     FoundEffect,
+    NamedEffect,
     RankedSet,
     RivalEffect,
 )
@@ -30,7 +31,6 @@ from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
     CandidateSet,
-    Component,
     CostTerms,
     EffectCandidate,
     UnknownCandidate,
@@ -57,7 +57,7 @@ from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-MOST_SETS, MOST_BARRED = 8, 3  # rows and inadmissible sets that are listed
+MOST_SETS = 8  # rows that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
@@ -148,7 +148,7 @@ class Answer:
         return Diagnosis(
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
             tuple(self._ranked(row.fitted, row.terms) for row in table.rows[:MOST_SETS]),
-            self._barred(), tuple(moved),
+            tuple(moved),
             find_cautions(table.last, table.reported, effects, self.noise_levels),
             first.notes, first.given, self.adopted, self.given, self.remaining, self.noise,
             self.noise_levels, above, little, self.unseen,
@@ -182,13 +182,6 @@ class Answer:
             self._ranked(without.fitted, without.terms), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
-
-    def losing(self, effect: FoundEffect) -> set[str]:
-        """Return the drives whose error an effect raises, on the recordings or held out."""
-        raised = {drive for d, drive in enumerate(self.drives) if np.any(effect.force[:, d])
-                  and root_mean_square(self.remaining[:, d])
-                  >= root_mean_square(self.remaining[:, d] + effect.force[:, d])}
-        return raised.union(() if effect.gain is None else effect.gain.losing)
 
     def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
         """Return held-out errors without and with an effect, and its gain where it is known."""
@@ -317,16 +310,8 @@ class Answer:
 
     def _ranked(self, fitted: CandidateSet, terms: CostTerms) -> RankedSet:
         """Return a set with its cost above that of the best row."""
-        names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
-        return RankedSet(names, terms - self.table.best.terms, fitted.barred)
-
-    def _barred(self) -> tuple[RankedSet, ...]:
-        """Return inadmissible sets that would be rivals or better, the cheapest of each names."""
-        found: dict[frozenset[str], RankedSet] = {}
-        for fitted in self.table.barred(self.decisions.rival_margin):
-            found.setdefault(frozenset(candidate.name for candidate in fitted.candidates),
-                             self._ranked(fitted, fitted.terms))
-        return tuple(found.values())[:MOST_BARRED]
+        return RankedSet(tuple(NamedEffect(c.name, self.design.named(c.drives))
+                               for c in fitted.candidates), terms - self.table.best.terms)
 
 
 def objection(ratio: float, gain: PredictiveGain | None, decisions: Decisions) -> str:
@@ -352,36 +337,20 @@ def objection(ratio: float, gain: PredictiveGain | None, decisions: Decisions) -
     return ''
 
 
-def answer_of(table: ModelTable, validate: Sequence[Recording]) -> Diagnosis:
+def answer_of(table: ModelTable, validate: Sequence[Recording], row: Row | None = None,
+              unconfirmed: tuple[FoundEffect, ...] = ()) -> Diagnosis:
     """Return the answer of a table: that of the row of least cost.
 
     Where an effect of it is not confirmed, the answer is that of the row without it: what remains
-    then decides about the verdict, and with no effect left it is `unknown`. An effect that some
-    drives refute is not reported on these.
+    then decides about the verdict, and with no effect left it is `unknown`.
     """
-    fits = table.best.fits
-    unconfirmed: tuple[FoundEffect, ...] = ()
-    answer = Answer(table, table.best, validate)
-    while refuted := {effect.name: effect for effect in unconfirmed_effects(answer)}:
-        rest: list[EffectCandidate | UnknownCandidate] = []
-        for candidate in answer.fitted.candidates:
-            effect = refuted.get(candidate.name)
-            if effect is None:
-                rest.append(candidate)
-            elif kept := on_other_drives(candidate, answer.drives, answer.losing(effect)):
-                rest.append(EffectCandidate.of(kept))
-            else:
-                unconfirmed = (*unconfirmed, effect)
-        answer = Answer(table, Row(fits, fits.evaluate(tuple(rest)), 0.0), validate)
-    return answer.diagnosis(unconfirmed)
-
-
-def on_other_drives(candidate: EffectCandidate | UnknownCandidate, drives: Sequence[str],
-                    losing: Collection[str]) -> list[Component]:
-    """Return an effect's parts on the drives that do not lose by it; none for all."""
-    kept = [component for component in candidate.components
-            if component.drive is not None and drives[component.drive] not in losing]
-    return kept if len(kept) < len(candidate.components) else []
+    answer = Answer(table, row or table.best, validate)
+    refuted = unconfirmed_effects(answer)
+    if not refuted:
+        return answer.diagnosis(unconfirmed)
+    names, fits = {effect.name for effect in refuted}, table.best.fits
+    rest = fits.evaluate(tuple(c for c in answer.fitted.candidates if c.name not in names))
+    return answer_of(table, validate, Row(fits, rest, 0.0), (*unconfirmed, *refuted))
 
 
 @outside_cost('an effect that raises the error, on the recordings or held out, is not reported; '

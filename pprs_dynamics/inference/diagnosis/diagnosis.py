@@ -49,30 +49,21 @@ class RankedSet(JsonRecord):
 
     Parameters
     ----------
-    names : tuple of (name, drives)
+    effects : tuple of NamedEffect
         Effects, and `unknown, VARIABLE` for patterns of no catalogue.
     terms : CostTerms
         Terms of the cost, less those of the set that it is compared with.
-    barred : str
-        Why it is excluded, whatever it costs; '' where it is not.
     """
 
-    json_keys = ('cost', 'terms', 'effects', 'barred')
-    json_optional = ('barred',)
+    json_keys = ('cost', 'terms', 'effects')
 
-    names: tuple[tuple[str, Drives], ...]
+    effects: tuple[NamedEffect, ...]
     terms: CostTerms
-    barred: str = ''
 
     @property
     def cost(self) -> float:
         """Cost above that of the set that it is compared with; lower is better."""
         return self.terms.total
-
-    @property
-    def effects(self) -> tuple[NamedEffect, ...]:
-        """Effects, and `unknown, VARIABLE` for patterns of no catalogue."""
-        return tuple(NamedEffect(*named) for named in self.names)
 
 
 @dataclass(frozen=True)
@@ -285,8 +276,6 @@ class Diagnosis(JsonRecord):
         Patterns of the error that no effect explains.
     sets : tuple of RankedSet
         The best sets of the search; the first is reported.
-    barred : tuple of RankedSet
-        Excluded sets that cost less than the best one or at most 10 more, with the reason.
     calibrated : tuple of Calibration
         Numbers of the model that moved within their tolerances.
     warnings, notes : tuple of str
@@ -325,10 +314,10 @@ class Diagnosis(JsonRecord):
     """
 
     json_keys = (
-        'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'barred', 'depends_on',
+        'verdict', 'effects', 'indistinguishable', 'unconfirmed', 'sets', 'depends_on',
         'calibrated', 'detectable', 'held_out_on', 'above_noise', 'noise_floor', 'noise_floors',
         'warnings', 'refit', 'candidates', 'suspects', 'stick_slip', 'effort_looks_like',
-        'explained', 'explained_after', 'little_explained', 'reference', 'changed_since')
+        'explained', 'little_explained', 'reference')
     json_attributes = (('refit', 'refit_errors'), ('effort_looks_like', 'kinds_of_effort'),
                        ('little_explained', 'little'), ('reference', 'since'))
 
@@ -340,7 +329,6 @@ class Diagnosis(JsonRecord):
     suspects: tuple[EffectAlone, ...]
     depends_on: tuple[Statement, ...]
     sets: tuple[RankedSet, ...]
-    barred: tuple[RankedSet, ...]
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -393,15 +381,6 @@ class Diagnosis(JsonRecord):
         """Share of each drive's effort variance that the input model explains."""
         return explained_shares(self.residuals)
 
-    @property
-    def explained_after(self) -> dict[str, float]:
-        """Share that the model with the reported effects explains."""
-        return explained_shares(self.residuals, self.remaining)
-
-    @property
-    def changed_since(self) -> tuple[str, ...] | None:
-        """Effects that have changed since the reference; null without one."""
-        return None if self.since is None else tuple(effect.name for effect in self.effects)
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ class Sentences:
         The verdict, at most two sentences.
     effects, rivals, unexplained : tuple of Finding
         In the order of `Diagnosis.effects`, of the given rivals, and of `unexplained_groups`.
-    suspects, barred, calibrated, warnings : tuple of str
+    suspects, refuted, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     reference : tuple of str
@@ -104,7 +104,7 @@ class Sentences:
     rivals: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
-    barred: tuple[str, ...]
+    refuted: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
     following: str
@@ -136,10 +136,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(f'{with_drives(suspect.name, suspect.drives, drives)}: possible, but it costs '
               f'{-suspect.evidence:.1f} more than it explains. A longer recording decides'
               for suspect in diagnosis.suspects),
-        (*(f'{_title(diagnosis, effect)}: not reported, because {effect.objection}'
-           for effect in diagnosis.unconfirmed),
-         *(f'{_set(diagnosis, ranked)}: excluded, because {ranked.barred}. This set {_cost(ranked)}'
-           for ranked in diagnosis.barred)),
+        tuple(f'{_title(diagnosis, effect)}: not reported, because {effect.objection}'
+              for effect in diagnosis.unconfirmed),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, *next_step(diagnosis, files), word_reference(diagnosis.since))
 
@@ -224,10 +222,10 @@ def word_detectable(diagnosis: Diagnosis) -> str:
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
     """Return the effects and patterns of a set with their drives."""
     found = []
-    for name, drives in ranked.names:
-        unknown, _, variable = name.partition(', ')
-        found.append(with_drives(pattern_over(variable) if variable and unknown == 'unknown'
-                                 else name, drives, diagnosis.residuals.drives))
+    for effect in ranked.effects:
+        _, unknown, variable = effect.name.partition('unknown, ')
+        found.append(with_drives(pattern_over(variable) if unknown else effect.name,
+                                 effect.drives, diagnosis.residuals.drives))
     return ' + '.join(found) or 'nothing missing'
 
 
@@ -255,20 +253,16 @@ def _rise(cost: float) -> str:
     return f'{cost:+.1f}' if abs(cost) < WHOLE else f'{cost:+.0f}'
 
 
-def _cost(ranked: RankedSet) -> str:
-    return f'costs {_rise(ranked.cost)[1:]} {"less" if ranked.cost < 0 else "more"}'
-
-
 def runner_up(diagnosis: Diagnosis) -> str:
     """Return the best set that differs from the reported one, and its cost; '' for none.
 
     A set that lacks a reported effect comes before a set that has one more.
     """
-    best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
-    others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
-    others.sort(key=lambda ranked: best <= set(ranked.names))
-    return (f'{_set(diagnosis, others[0])} {_cost(others[0])} (10 are odds of 150 to 1)'
-            if others else '')
+    best = set(diagnosis.sets[0].effects) if diagnosis.sets else set()
+    others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.effects) != best]
+    others.sort(key=lambda ranked: best <= set(ranked.effects))
+    return (f'{_set(diagnosis, others[0])} costs {_rise(others[0].cost)[1:]} more '
+            '(10 are odds of 150 to 1)' if others else '')
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:
