@@ -21,6 +21,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     capitalised,
     in_unit,
     listed,
+    name_drives,
     percent,
     word_little,
 )
@@ -229,8 +230,7 @@ class Comparison(JsonRecord):
         share = ('' if np.isnan(self.relative) else
                  f" ({percent(self.relative)} of the effort's variation)")
         little = f'{word_little(self.little)}; ' if self.little else ''
-        error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
-        error = capitalised(error)
+        error = capitalised(f'{little}the error is {in_unit(self.rms, self.unit)}{share}')
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
         if self.relative < DECISIONS.negligible:
             return f'{error}, which is negligible.'
@@ -238,14 +238,9 @@ class Comparison(JsonRecord):
             placed = sorted({place.drive for place in self.where})
             return f'{error}. It is noise{f", except on {listed(placed)}" if placed else ""}.'
         worst = max(beyond, key=lambda drive: drive.unexplained)
-        where = 'every drive' if len(beyond) == len(self.drives) > 1 else listed(
-            [drive.drive for drive in beyond])
-        known = any(drive.noise_floor is not None for drive in beyond)
-        what = 'it is more than noise' if known else 'the noise is not known'
-        worst_is = f'; the worst is {worst.drive} with ' if len(beyond) > 1 else ': '
-        kind = ' unexplained' if worst.noise_floor is not None else ', its noise unknown'
-        return (f'{error}. On {where} {what}{worst_is}{in_unit(worst.unexplained, worst.unit)}'
-                f'{kind if known else ""} ({worst.grade}).')
+        where = name_drives([drive.drive for drive in beyond], list(self.drives))
+        return (f'{error}. On {where} it is more than any known noise; most on {worst.drive}, '
+                f'{in_unit(worst.unexplained, worst.unit)} ({worst.grade}).')
 
     @property
     def overall(self) -> dict[str, float]:

@@ -18,7 +18,8 @@ from typing import Annotated, Any
 
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty, word_little
+from pprs_dynamics.inference.diagnosis.quantities import with_drives, word_little
+from pprs_dynamics.inference.diagnosis.sentences import word_values
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.held_out import predictive_gain
@@ -30,7 +31,6 @@ from pprs_dynamics.system.json_records import JsonRecord
 # Share of a window's samples in which some drive moves, below which it is not diagnosed, and share
 # of a drive's highest speed above which it moves.
 LEAST_MOTION, MOVING = 0.2, 0.02
-MOST_VALUES = 3  # of an effect in its sentence
 
 
 @dataclass(frozen=True)
@@ -64,16 +64,12 @@ class LiveEffect(JsonRecord):
 
     def sentence(self, every: tuple[str, ...]) -> str:
         """Return the change in words; `every` names all drives."""
-        given = self.found.in_model
-        values = ', '.join(
-            f'{key} {with_uncertainty(estimate.value, estimate.std, estimate.unit)}'
-            + (f' ({with_uncertainty(given[key], 0.0, estimate.unit)} in the model)'
-               if key in given else '')
-            for key, estimate in list(self.found.parameters.items())[:MOST_VALUES])
+        found = self.found
+        values = word_values(found.effect, found.parameters, found.moments, every, found.in_model)
         since = 'from the start' if self.since is None else (
             f'since {datetime.fromtimestamp(self.since):%H:%M:%S}')
-        what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
-        return f'{what}: {values}, {since}'
+        what = with_drives(found.name.replace('_', ' '), found.drives, every)
+        return f'{what}: {"; ".join(values.values())}, {since}'
 
 
 @dataclass(frozen=True)
