@@ -22,7 +22,7 @@ from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_residual, linearised
@@ -142,26 +142,7 @@ class TickFits:
         In the best shape that a scan knows at the noise of the set; None where it cannot act.
         """
         with self._scanning:
-            if drives is None or not issubclass(effect, DriveEffect):
-                return next((c for c in self._proposed(found) if c.effect is effect), None)
-            placements = [placement for d in drives
-                          if (placement := self._on_drive(effect, d, found)) is not None]
-        if not placements or len(placements) < len(drives):
-            return None
-        return EffectCandidate.of(placements)
-
-    def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
-                  ) -> Component | None:
-        components = self.fits.components
-        if d in components.local:
-            scanned = components.local[d].offers(found.fit).get(effect.name)
-            if scanned is not None:
-                return scanned[0]
-        there = [component for component in components.spanning
-                 if component.effect is effect and component.drive == d]
-        # All have the same prior cost.
-        return max(there, key=lambda component: self.fits.regression.gain(
-            found.fit, components.block(component)), default=None)
+            return self.scan.offered(effect, drives, found)
 
     def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
         """Return every effect on the drives where it reduces the cost of a set most."""

@@ -35,7 +35,7 @@ from pprs_dynamics.inference.diagnosis.statements import in_words, read_in
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms
-from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate
+from pprs_dynamics.inference.search.candidates import Candidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import calibrations, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
@@ -297,20 +297,17 @@ def requested_row(table: ModelTable, request: EffectRequest) -> Row:
         if request.drives in (None, row.fits.design.named(found.drives)):
             return row if row.is_exact else Row.exact(row.fits, row.fitted)
         fits, rest = row.fits, row.fitted.without(found)
-    design, scan = fits.design, Scan(fits)
-    offers = scan.offers(fits.evaluate(rest)).get(request.effect, [])
-    if request.drives is None:
-        chosen = scan.best_drives(request.effect, offers, None)[1] if offers else []
-    else:
-        chosen = [component for _, component in offers if component.drive is not None
-                  and design.drives[component.drive] in request.drives]
-    if len(chosen) < len(request.drives or (None,)):
-        standing = [name for name in request.drives or design.drives
+    design, names = fits.design, request.drives
+    chosen = Scan(fits).offered(
+        request.effect, None if names is None else [design.drives.index(name) for name in names],
+        fits.evaluate(rest))
+    if chosen is None:
+        standing = [name for name in names or design.drives
                     if not design.moves(design.drives.index(name))]
         raise EffectRequestError(
             f'{", ".join(standing)} hardly moved in the recordings' if standing
             else f'{request.name} has no force in these recordings')
-    fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
+    fitted = fits.refined(fits.evaluate((*rest, chosen)))
     return Row(*linearised(fits, fitted), 0.0)
 
 

@@ -16,6 +16,8 @@ from pprs_dynamics.inference.regression.base_columns import ReversalShape
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_model import friction_forms
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 
@@ -27,7 +29,7 @@ def find_cautions(
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_length(fits, best), *_motion(fits), *_filtered(fits),
             *_reversals(fits, best, noise_levels), *_second_encoders(fits, effects),
-            *_unexcited(fits, best))
+            *_unexcited(fits, best), *_one_load(fits, effects))
 
 
 def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
@@ -127,3 +129,22 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
                         else f'{term.effect.name} ({", ".join(names)})')
     if weak:
         yield f'this motion hardly excites {listed(weak)}: no statement about them is possible'
+
+
+def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
+    """Yield friction that a form error separates from one that follows the load, or does not."""
+    design = fits.design
+    for effect in effects:
+        other = CATALOGUE.get(effect.effect.at_one_load)
+        if other is None or not issubclass(other, DriveEffect):
+            continue
+        alike = []
+        for d in map(design.drives.index, effect.drives or ()):
+            force = np.nan_to_num(effect.force[:, d])
+            columns = np.nan_to_num(design.drive_rows(other, d, {}))
+            rest = force - np.linalg.lstsq(columns.T, force, rcond=None)[0] @ columns
+            if root_mean_square(rest) < fits.decisions.form_share * root_mean_square(force):
+                alike.append(design.drives[d])
+        if alike:
+            yield (f'{effect.name} and {other.name} cannot be separated on {listed(alike)}, '
+                   'because the load hardly varies. Record with another load')

@@ -15,7 +15,6 @@ import numpy as np
 
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.readings.mounting import MOUNTING
-from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import reference_files
@@ -138,9 +137,6 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     if diagnosis.depends_on or diagnosis.above_noise:
         return REPEAT, both
     if diagnosis.verdict == 'ambiguous':
-        if all(_need_another_load(names) for names in diagnosis.indistinguishable):
-            return ('Repeat the motion with another load, and write the load into the model file. '
-                    'Friction that depends on load grows with it', other)
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not effects:
@@ -156,11 +152,6 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     if diagnosis.suspects:
         return REPEAT, both
     return 'Nothing to add. Another motion may excite other effects', other
-
-
-def _need_another_load(names: Sequence[str]) -> bool:
-    effect = find_effect(names[0])
-    return effect is not None and list(names[1:]) == [effect.at_one_load]
 
 
 def _curve(diagnosis: Diagnosis) -> str | None:

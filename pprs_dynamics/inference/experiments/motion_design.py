@@ -144,6 +144,8 @@ class Motions:
     ------
     NoMotionError
         Where the limits do not even let the robot stand in the middle of its workspace.
+    PprsError
+        Where it cannot stand there at all.
     """
 
     model: DriveModel
@@ -156,16 +158,12 @@ class Motions:
         object.__setattr__(self, 'middle', middle)
         standing = JointSeries(np.zeros((len(middle), JointSeries.size(2))), middle,
                                self.duration, 2)
-        try:
-            uses = self.uses(standing, np.linspace(0.0, self.duration, 4))
-            reason = max(uses, key=lambda name: uses[name])
-            if uses[reason] <= 1:
-                return
-        except PprsError as error:
-            reason = str(error)
-        raise NoMotionError('no motion is allowed: at rest in the middle of its workspace the '
-                            f'robot already exceeds its limit of {reason}, less the margin; '
-                            'raise the limits in the model file')
+        uses = self.uses(standing, np.linspace(0.0, self.duration, 4))
+        worst = max(uses, key=uses.__getitem__)
+        if uses[worst] > 1:
+            raise NoMotionError('no motion is allowed: at rest in the middle of its workspace the '
+                                f'robot already exceeds its limit of {worst}, less the margin; '
+                                'raise the limits in the model file')
 
     def sampled(self, series: JointSeries, time: Array) -> PlatformMotion | JointMotion:
         """Return the motion of a series at times [s]: of the 3-PPRS that of its platform."""

@@ -9,7 +9,7 @@ of sums that are known. It proposes; a fit with its own noise decides (`search.s
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 
 import numpy as np
 
@@ -89,6 +89,19 @@ class Scan:
         for scored in best.values():
             found.setdefault(scored[1].effect, []).append(scored)
         return found
+
+    def offered(self, effect: type[CatalogueEffect], drives: Collection[int] | None,
+                base: CandidateSet) -> EffectCandidate | None:
+        """Return an effect on some drives, or where it reduces the cost of a set most.
+
+        In the best shape at the noise of the set; None where it cannot act.
+        """
+        found = self.offers(base).get(effect, [])
+        if drives is None or not issubclass(effect, DriveEffect):
+            chosen = self.best_drives(effect, found, None)[1] if found else []
+        else:
+            chosen = [component for _, component in found if component.drive in drives]
+        return EffectCandidate.of(chosen) if len(chosen) >= len(drives or (0,)) else None
 
     def best_drives(
         self, effect: type[CatalogueEffect], found: Sequence[Scored],
