@@ -202,21 +202,12 @@ class Answer:
         return hold_out(self.fits, self.fitted)
 
     def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
-        """Return the parameters that the input model has of an effect; none where it lacks it.
-
-        Of links and joints only those that the effect is on.
-        """
-        found = {}
-        for component in candidate.components:
-            values = self.table.first.design.present(component.effect, component.drive)
-            prefix = '' if component.drive is None else f'{self.drives[component.drive]}.'
-            found.update({prefix + name: float(value) for name, value in (values or {}).items()
-                          if prefix + name in keys})
-        # A body or friction on a link or joint where there is none is new.
-        return found if not candidate.effect.is_of_one_place or any(
-            component.given[k] for component in candidate.components if component.given
-            for k, c in enumerate(component.effect.coefficients)
-            if c.name in component.names) else {}
+        """Return the values that the input model has of an effect; none where it lacks it."""
+        given, prefix = self.table.first.design.given, f'effects.{candidate.name}.'
+        if all(effect.name != candidate.name for effect in given.effects):
+            return {}
+        return {key: float(given.values[prefix + key]) for key in keys
+                if prefix + key in given.values}
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return estimates of an effect by sets that cost nearly as little, and what they cost."""
@@ -374,18 +365,14 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     validate : sequence of Recording, optional
         Those of the diagnosis; without them held-out errors are taken on blocks.
     """
-    table = diagnosis.selection
-    if table is None:
-        return ()
-    reported = {c.name: c.placed_name for c in table.best.effects}
-    found = []
-    for of, *names in diagnosis.indistinguishable:
-        for name in names:
-            row = next(row for row in table.rows if reported[of] not in row.placed_names
-                       and any(name in (c.name, c.placed_name) for c in row.effects))
-            answer = Answer(table, row, validate)
-            candidate = next(c for c in answer.fitted.effects
-                             if name in (c.name, c.placed_name))
-            found.append(RivalEffect(answer.found(candidate), of, row.cost - table.best.cost,
-                                     answer.remaining))
-    return tuple(found)
+    table, found = diagnosis.selection, dict[str, RivalEffect]()
+    named = {name for _, *names in diagnosis.indistinguishable for name in names}
+    for rival in table.rivals(table.first.decisions.rival_margin) if table else ():
+        new = [c for c in rival.row.effects if c.placed_name not in found
+               and {c.name, c.placed_name} & named.intersection(rival.instead)]
+        if table and new:
+            answer = Answer(table, rival.row, validate)
+            found.update({c.placed_name: RivalEffect(
+                answer.found(c), rival.missing[0], rival.row.cost - table.best.cost,
+                answer.remaining) for c in new})
+    return tuple(found.values())
