@@ -41,7 +41,7 @@ def made_up_pages() -> dict[str, Page]:
         sets=made.ranked_sets('coulomb_friction', 'hysteresis'))
     words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
     return {
-        'diagnosis': diagnosis_page(diagnosis, words, made.made_up_residuals(), ['my run.mcap']),
+        'diagnosis': diagnosis_page(diagnosis, words, ['my run.mcap']),
         'adoption': _adoption(diagnosis.residuals)}
 
 

@@ -210,7 +210,8 @@ class ComparisonResult(Result):
         other = no_measurements(recording.findings for recording in self.inputs.fitted)
         if other and not self.inputs.as_it_is:
             return measure_first(other, self.inputs.files)
-        if self.comparison.little:
+        is_friction = bool(self.where) and self.where[0].kind == 'friction'
+        if self.comparison.little and (self.inputs.model.has_links or not is_friction):
             return first_step(self.inputs.model, self.inputs.files)
         return ('Find out which physical effect is missing',
                 self.inputs.files.command('diagnose', '--report', 'why.html'))

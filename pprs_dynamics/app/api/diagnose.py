@@ -49,8 +49,7 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     word_diagnosis,
     word_values,
 )
-from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms, rms_by_drive
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
@@ -226,7 +225,7 @@ def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
 
 
 def diagnosis_page(
-    diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
+    diagnosis: Diagnosis, words: Sentences, recordings: Sequence[str],
     validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
 ) -> Page:
     """Return the page: the result on one screen, then evidence, confirmation and alternatives.
@@ -236,8 +235,6 @@ def diagnosis_page(
     diagnosis : Diagnosis
     words : Sentences
         Of it.
-    after : Residuals
-        Of `diagnosis.adopted` on the same recordings.
     recordings, validation : sequence of str
         Names of those fitted, and of those held out.
     rivals : sequence of RivalEffect
@@ -250,7 +247,7 @@ def diagnosis_page(
         page.text(sentence(text))
     page.sources(diagnosis.model.source, recordings, validation)
     with page.columns():
-        _errors(page, diagnosis, after)
+        _errors(page, diagnosis)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
     page.folded_list('Warnings', words.warnings, is_open=True)
@@ -267,7 +264,7 @@ def diagnosis_page(
             figures.add_contributions(page, diagnosis.residuals, {
                 effect.name: effect.force for effect in diagnosis.effects},
                 'Contribution of each effect.')
-    figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,
+    figures.add_every_drive(page, diagnosis.residuals, diagnosis.after, diagnosis.noise_floors,
                             'with the input model and with the reported effects')
     _add_tables(page, _values(diagnosis))
     page.folded_list(*calibrated)
@@ -299,8 +296,8 @@ def _add_tables(page: Page, tables: Iterator[TitledTable]) -> None:
             page.table(*table)
 
 
-def _errors(page: Page, diagnosis: Diagnosis, after: Residuals) -> None:
-    floors, unit = diagnosis.noise_floors, diagnosis.residuals.unit
+def _errors(page: Page, diagnosis: Diagnosis) -> None:
+    after, floors, unit = diagnosis.after, diagnosis.noise_floors, diagnosis.residuals.unit
     fell = bool(diagnosis.effects)
     before, now = rms_by_drive(diagnosis.residuals), rms_by_drive(after)
     rows = [ErrorRow('all drives', rms(diagnosis.residuals), rms(after) if fell else None,
@@ -379,9 +376,7 @@ class DiagnosisResult(Result):
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""
-        after, _ = measure_residuals(self.fitted, self.inputs.fitted)
-        return diagnosis_page(
-            self.diagnosis, self._words, after, *self.inputs.names, self._rivals)
+        return diagnosis_page(self.diagnosis, self._words, *self.inputs.names, self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
@@ -392,8 +387,7 @@ class DiagnosisResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""
-        residuals = self.diagnosis.residuals
-        after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
+        residuals, after = self.diagnosis.residuals, self.diagnosis.after
         return plot_errors(
             {'before': rms_by_drive(residuals), 'with the reported effects': rms_by_drive(after),
              'noise': self.diagnosis.noise_floors}, residuals.unit)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -355,6 +355,11 @@ class Diagnosis(JsonRecord):
                 or any(effect.course for effect in self.effects)):
             return ()
         return detectable_sizes(self.selection.last, self.selection.reported)
+
+    @property
+    def after(self) -> Residuals:
+        """Residuals of the model with the effects."""
+        return replace(self.residuals, model=self.residuals.measured - self.remaining)
 
     @cached_property
     def noise_floor(self) -> float:
