@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command,
 from pprs_dynamics.inference.diagnosis.comparison import Comparison, localise
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
-from pprs_dynamics.inference.diagnosis.quantities import measured, percent, with_sign
+from pprs_dynamics.inference.diagnosis.quantities import measured, percent, rounded_as
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
@@ -88,7 +88,7 @@ class ComparisonResult(Result):
         return ('drive', *(f'{name} [{comparison.unit}]' if name in marked else name
                            for name in headings), 'grade'), [
             (name, measured(drive.rms), percent(drive.relative),
-             with_sign(drive.bias), measured(drive.peak),
+             rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
              percent(drive.explained_variance),
              '' if drive.noise_floor is None else measured(drive.noise_floor, 2),
              drive.grade)

@@ -393,7 +393,7 @@ def _of_table(case: _Case, request: EffectRequest, row: Row, effect: FoundEffect
     for first in case.diagnosis.effects:
         on = f' on {listed(first.drives)}' if first.drives else ''
         return (f'{first.name}{on} explains these recordings better ({more})',)
-    other = 'other values of ' if request.present(case.model) else ''
+    other = 'other values of ' * any(there.name == name for there in case.model.effects)
     return (f'the recordings do not support {other}{name}: {more} than the model as it is',)
 
 

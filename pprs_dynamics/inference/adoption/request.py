@@ -113,12 +113,6 @@ class EffectRequest:
         assert self.drives is not None
         return self.drives[0]
 
-    def present(self, model: DriveModel) -> bool:
-        """Return whether the model has it already, on every drive that is asked for if any is."""
-        return any(effect.name == self.name and (
-            not isinstance(effect, DriveEffect) or set(self.drives or ()) <= set(effect.drives))
-            for effect in model.effects)
-
 
 def requested(text: str, model: DriveModel) -> EffectRequest:
     """Read a request for a model.

@@ -239,8 +239,9 @@ class Comparison(JsonRecord):
             return f'{error}. It is noise{f", except on {listed(placed)}" if placed else ""}.'
         worst = max(beyond, key=lambda drive: drive.unexplained)
         where = name_drives([drive.drive for drive in beyond], list(self.drives))
-        return (f'{error}. On {where} it is more than any known noise; most on {worst.drive}, '
-                f'{in_unit(worst.unexplained, worst.unit)} ({worst.grade}).')
+        most = f', most on {worst.drive}' * (len(beyond) > 1)
+        return (f'{error}. On {where} it is more than noise{most}: '
+                f'{in_unit(worst.unexplained, worst.unit)} unexplained ({worst.grade}).')
 
     @property
     def overall(self) -> dict[str, float]:

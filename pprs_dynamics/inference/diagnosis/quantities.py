@@ -78,6 +78,13 @@ def measured(value: float, digits: int = 3) -> str:
     return f'{value:.{_decimals(value, digits)}f}'
 
 
+def rounded_as(value: float, other: float, sign: str = '') -> str:
+    """Return a number to the place at which another of its kind has three digits."""
+    decimals = _decimals(other, 3) if isfinite(other) and abs(other) >= RESOLVED else 0
+    text = f'{value:{sign}.{decimals}f}'
+    return text if float(text) else f'{0:.{decimals}f}'
+
+
 def _decimals(value: float, digits: int) -> int:
     return max(digits - 1 - floor(log10(abs(value))), 0)
 

@@ -16,7 +16,8 @@ identification, IEEE Transactions on Robotics and Automation 13 (1997) 730-740.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -151,12 +152,9 @@ class Motions:
     model: DriveModel
     limits: MotionLimits
     duration: float
-    middle: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        middle, _ = room(self.model)
-        object.__setattr__(self, 'middle', middle)
-        standing = JointSeries(np.zeros((len(middle), JointSeries.size(2))), middle,
+        standing = JointSeries(np.zeros((len(self.middle), JointSeries.size(2))), self.middle,
                                self.duration, 2)
         uses = self.uses(standing, np.linspace(0.0, self.duration, 4))
         worst = max(uses, key=uses.__getitem__)
@@ -164,6 +162,11 @@ class Motions:
             raise NoMotionError('no motion is allowed: at rest in the middle of its workspace the '
                                 f'robot already exceeds its limit of {worst}, less the margin; '
                                 'raise the limits in the model file')
+
+    @cached_property
+    def middle(self) -> Array:
+        """Positions of the drives about which they move, (D,)."""
+        return room(self.model)[0]
 
     def sampled(self, series: JointSeries, time: Array) -> PlatformMotion | JointMotion:
         """Return the motion of a series at times [s]: of the 3-PPRS that of its platform."""
