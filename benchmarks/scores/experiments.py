@@ -41,8 +41,11 @@ from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions
-from pprs_dynamics.inference.experiments.next_experiment import design_experiment
-from pprs_dynamics.inference.experiments.question import Question, question_of
+from pprs_dynamics.inference.experiments.next_experiment import (
+    Question,
+    design_experiment,
+    question_of,
+)
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation

@@ -27,10 +27,12 @@ from pprs_dynamics.inference.experiments.motion_design import (
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
 from pprs_dynamics.inference.experiments.next_experiment import (
     COMMISSION,
+    FittedTerm,
+    Information,
     PurposeError,
     next_experiment,
+    whitened,
 )
-from pprs_dynamics.inference.experiments.question import FittedTerm, Information, whitened
 from pprs_dynamics.inference.regression.base_columns import (
     LoadOfFriction,
     ModelNumber,
