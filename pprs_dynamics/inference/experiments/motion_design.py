@@ -146,7 +146,7 @@ class Motions:
     NoMotionError
         Where the limits do not even let the robot stand in the middle of its workspace.
     PprsError
-        Where it cannot stand there at all.
+        Where the model has no forces at that pose.
     """
 
     model: DriveModel

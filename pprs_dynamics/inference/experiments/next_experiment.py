@@ -50,7 +50,7 @@ from pprs_dynamics.inference.regression.sensitivities import Sensitivities, mode
 from pprs_dynamics.inference.regression.terms import Rows
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.body_centres import about_centre
-from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.table import ModelTable, Rival, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
@@ -64,7 +64,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.system.json_records import JsonRecord
 
-SEPARATE, ESTIMATE, COMMISSION = 'separate', 'estimate', 'commission'
+SEPARATE, COMMISSION = 'separate', 'commission'
 PURPOSES = (SEPARATE, COMMISSION)
 SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
@@ -317,7 +317,7 @@ class Question:
 
     Parameters
     ----------
-    kind : {'separate', 'estimate', 'commission'}
+    kind : {'separate', 'commission'}
     information : Information
         Of any motion.
     known : (P, P) array
@@ -353,14 +353,8 @@ def question_of(model: DriveModel, recordings: Sequence[Recording], motions: Mot
     """Return the rivals and uncertain effects after recordings; errors as `diagnose`."""
     table = tabulate(model, recordings, DECISIONS, progress)
     rivals = table.rivals(DECISIONS.rival_margin)
-    if rivals:
-        return _separation(table, rivals, motions)
-    adopted, fits = table.reported, table.last
-    if not adopted.effects:
-        return commissioning(model, recordings, motions)
-    # Effects of one set are fitted together.
-    return _question(ESTIMATE, fits.design, fits.regression, adopted.fit, motions,
-                     [_terms(adopted, adopted.effects)])
+    return _separation(table, rivals, motions) if rivals else (
+        commissioning(model, recordings, motions))
 
 
 def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) -> Question:
@@ -379,7 +373,8 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     rows = [table.best, *(rival.row for rival in chosen)]
     fits = table.last if all(row.fitted.is_nonlinear for row in rows) else table.first
     placed = [fits.evaluate(row.fitted.candidates) for row in rows]
-    terms = [_terms(fitted, fitted.effects) for fitted in placed]
+    terms = [tuple(FittedTerm(component, fitted.coefficients(component))
+                   for c in fitted.effects for component in c.components) for fitted in placed]
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
@@ -396,12 +391,6 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
             information.force(terms[true]) - certain, (*range(len(information.base)), *free),
             *sides, rows[refitted].cost - rows[true].cost))
     return replace(question, contests=tuple(contests), subjects=_names(terms[:1]))
-
-
-def _terms(fitted: CandidateSet, candidates: Sequence[EffectCandidate]) -> tuple[FittedTerm, ...]:
-    """Return effects of a set with their values."""
-    return tuple(FittedTerm(component, fitted.coefficients(component))
-                 for c in candidates for component in c.components)
 
 
 def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm, ...]:
@@ -447,7 +436,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
         d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
         for d, level in enumerate(levels)})
     return Question(COMMISSION, information, information.prior(),
-                    _numbers(information, groups, True), _names(groups), float(levels.max()))
+                    _numbers(information, groups), _names(groups), float(levels.max()))
 
 
 def _common_terms(model: DriveModel) -> list[FittedTerm]:
@@ -481,14 +470,14 @@ def _question(kind: str, design: Design, regression: Regression, fit: JointFit, 
     information = _information(design.given, design.model, motions, groups, regression.noise(fit))
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
     return Question(kind, information, information.of_recordings(design, regression, fit),
-                    _numbers(information, groups, kind == COMMISSION), _names(groups), floor)
+                    _numbers(information, groups), _names(groups), floor)
 
 
 def _names(groups: Sequence[Sequence[FittedTerm]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(term.component.effect.name for terms in groups for term in terms))
 
 
-def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]], with_model: bool,
+def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]],
              ) -> tuple[Contest, ...]:
     """Return a contest for each number of terms, which are fitted group by group, and of the model.
 
@@ -497,8 +486,7 @@ def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]], w
     base, model = range(len(information.base)), information.model
     asked: list[tuple[int, tuple[str, str, float, float], tuple[int, ...]]] = [
         (k, (column.number.label, column.number.unit, column.number.deviation, 1.0), ())
-        for k, column in enumerate(information.base)
-        if with_model and isinstance(column, ModelNumber)]
+        for k, column in enumerate(information.base) if isinstance(column, ModelNumber)]
     for terms in groups:
         places, labels = information.places(terms), [
             label for term in terms for label in term.labels(model)]
@@ -573,7 +561,7 @@ class Experiment(JsonRecord):
 
     Parameters
     ----------
-    kind : {'separate', 'estimate', 'commission'}
+    kind : {'separate', 'commission'}
         What the motion is for.
     subjects : tuple of str
         Effects in question.
@@ -664,9 +652,6 @@ class Experiment(JsonRecord):
             return ('This motion measures the numbers of the model and of common effects. It '
                     f'determines {self.determined} of {self.total} better than the size at which '
                     'they matter. Collisions are not checked.')
-        if self.kind == ESTIMATE:
-            return (f'Only one explanation remains: {", ".join(self.subjects)}. This motion '
-                    'measures its parameters best.')
         found = []
         if self.separates:
             found.append(f'This motion separates {_listed(self.separates)}. The expected evidence '
