@@ -165,7 +165,7 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     run = read_recording(path, given.recorded)
     found = diagnose(given, [run])
     assert found.verdict == 'adequate'
-    after = {number.label: number.after for number in found.calibrated}
+    after = {number.key: number.after for number in found.calibrated}
     assert after['robot.gain[2]'] == pytest.approx(4.0, rel=0.01)
 
 

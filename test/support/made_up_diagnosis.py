@@ -23,7 +23,7 @@ from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import CostTerms
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.inference.search.estimates import Estimate, FittedNumber
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 SAMPLES, PERIOD = 1500, 0.01
@@ -108,9 +108,9 @@ def ranked_sets(*names: str) -> tuple[RankedSet, ...]:
     return tuple(ranked_set(((name, ('lift_2',)),), 7.0 * k) for k, name in enumerate(names))
 
 
-def calibration(after: float = 1.02) -> Calibration:
+def calibration(after: float = 1.02) -> FittedNumber:
     """Return a payload that was weighed with a tolerance of 5 %."""
-    return Calibration('masses.payload', None, 1.0, 0.02, 'kg', after, 0.002)
+    return FittedNumber('masses.payload', '', 1.0, after, 0.002, 'kg')
 
 
 SUSPECT = EffectAlone('effort_offset', ('slide_3',), -4.2, 0.06)

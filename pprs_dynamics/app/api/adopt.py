@@ -190,7 +190,7 @@ class AdoptionResult(Result):
         if answer.calibrated:
             with page.fold('Numbers of the model that changed within their tolerances'):
                 page.table(('number', 'before', 'after'),
-                           [(number.label, with_uncertainty(number.value, 0.0, number.unit),
+                           [(number.key, with_uncertainty(number.before, 0.0, number.unit),
                              with_uncertainty(number.after, number.std, number.unit))
                             for number in answer.calibrated])
         return page

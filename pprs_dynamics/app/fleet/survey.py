@@ -33,8 +33,8 @@ from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed, shapes_of
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import (
-    Calibration,
     Estimate,
+    FittedNumber,
     calibrations,
     estimate,
     estimate_present,
@@ -119,9 +119,9 @@ def _row(effect: type[CatalogueEffect], key: str, found: Estimate, **more: float
             **vars(found), **more}
 
 
-def _numbers(calibrated: Sequence[Calibration]) -> list[dict[str, Any]]:
+def _numbers(calibrated: Sequence[FittedNumber]) -> list[dict[str, Any]]:
     """Return the rows of the model's numbers that are open within tolerances."""
-    return [{'effect': MODEL, 'parameter': number.label, 'value': number.after,
+    return [{'effect': MODEL, 'parameter': number.key, 'value': number.after,
              'std': number.std, 'unit': number.unit} for number in calibrated]
 
 

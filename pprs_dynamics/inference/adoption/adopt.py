@@ -271,7 +271,7 @@ def _with_effect(case: _Case, request: EffectRequest, beside: Sequence[FoundEffe
             key: replace(estimate, value=float(after.values[prefix + key]))
             for key, estimate in effect.parameters.items() if prefix + key in after.values},
         calibrated=tuple(number for number in calibrations(
-            answer.fits, answer.fitted) if number.after != number.value))
+            answer.fits, answer.fitted) if number.after != number.before))
 
 
 def requested_row(table: ModelTable, request: EffectRequest) -> Row:

@@ -17,7 +17,7 @@ from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.adoption.fit_curve import FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.inference.search.estimates import Estimate, FittedNumber
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -50,7 +50,7 @@ class Adoption(JsonRecord):
         Values by drive.parameter, or parameter.
     objections, remarks : tuple of str
         Sentences: why the effect should not be adopted, and what else its user should know.
-    calibrated : tuple of Calibration
+    calibrated : tuple of FittedNumber
         Numbers of the model that moved within their tolerances.
     rivals : tuple of str
         Effects that explain the recordings as well.
@@ -84,7 +84,7 @@ class Adoption(JsonRecord):
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     objections: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
-    calibrated: tuple[Calibration, ...] = ()
+    calibrated: tuple[FittedNumber, ...] = ()
     rivals: tuple[str, ...] = ()
     moments: Mapping[str, Estimate] = field(default_factory=dict)
     curve: FittedCurve | None = None
@@ -176,7 +176,7 @@ class LedgerBook:
             reference=adoption.reference, held_out_on=adoption.held_out_on, **errors,
             measured=tuple(before), drive_errors_before=tuple(map(_rounded, before.values())),
             drive_errors_after=tuple(map(_rounded, after.values())),
-            calibrated=tuple(number.label for number in adoption.calibrated),
+            calibrated=tuple(number.key for number in adoption.calibrated),
             rivals=adoption.rivals, objections=adoption.objections, forced=adoption.forced,
             date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
 

@@ -143,7 +143,7 @@ class Answer:
                    else 'ambiguous' if rivals else 'effect' if effects
                    else 'unknown' if unconfirmed else 'adequate')
         moved = [number for number in calibrations(self.fits, self.fitted)
-                 if abs(number.after - number.value) > self.decisions.sure * number.std]
+                 if abs(number.after - number.before) > self.decisions.sure * number.std]
         first = table.first.design
         return Diagnosis(
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,

@@ -29,7 +29,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
 )
 from pprs_dynamics.inference.search.components import placed
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.inference.search.estimates import Estimate, FittedNumber
 from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import PredictiveGain
@@ -276,7 +276,7 @@ class Diagnosis(JsonRecord):
         Patterns of the error that no effect explains.
     sets : tuple of RankedSet
         The best sets of the search; the first is reported.
-    calibrated : tuple of Calibration
+    calibrated : tuple of FittedNumber
         Numbers of the model that moved within their tolerances.
     warnings, notes : tuple of str
         Sentences that qualify the answer.
@@ -329,7 +329,7 @@ class Diagnosis(JsonRecord):
     suspects: tuple[EffectAlone, ...]
     depends_on: tuple[Statement, ...]
     sets: tuple[RankedSet, ...]
-    calibrated: tuple[Calibration, ...]
+    calibrated: tuple[FittedNumber, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     model: DriveModel

@@ -39,7 +39,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_on,
 )
 from pprs_dynamics.inference.search.candidates import CostTerms
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.inference.search.estimates import Estimate, FittedNumber
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -432,11 +432,11 @@ def _remarks(effect: FoundEffect) -> Iterator[str]:
                'tried; the true one may be beyond.')
 
 
-def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
-    moved = (f'{number.label}: {with_uncertainty(number.value, 0.0, number.unit)} becomes '
+def _calibrated(diagnosis: Diagnosis, number: FittedNumber) -> str:
+    moved = (f'{number.key}: {with_uncertainty(number.before, 0.0, number.unit)} becomes '
              f'{with_uncertainty(number.after, number.std, number.unit)}')
-    tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
-    if tolerance and abs(number.after - number.value) > (
-            tolerance * abs(number.value) + INTERVAL * number.std):
+    tolerance = diagnosis.model.values.get(f'tolerances.{number.key.partition("[")[0]}')
+    if tolerance and abs(number.after - number.before) > (
+            tolerance * abs(number.before) + INTERVAL * number.std):
         return f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first'
     return moved

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.mechanism_fit import Fitted, FittedNumber, fit_mechanism
+from pprs_dynamics.inference.fit.mechanism_fit import Fitted, fit_mechanism
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.estimates import calibrations
+from pprs_dynamics.inference.search.estimates import FittedNumber, calibrations
 from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
 from pprs_dynamics.inference.search.fitted_model import fitted_model, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -141,6 +141,4 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording]) -> Fitted:
     # friction reverses is free.
     fits = FittedSets(Design.of(model, recordings), DECISIONS)
     fits, found = linearised(fits, fits.evaluate(()))
-    return fitted_model(fits, found), tuple(
-        FittedNumber(number.label, '', number.value, number.after, number.std, number.unit)
-        for number in calibrations(fits, found)), ()
+    return fitted_model(fits, found), calibrations(fits, found), ()

@@ -22,7 +22,7 @@ inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.estimates import FittedNumber
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.mechanism.description import (
@@ -64,18 +65,6 @@ WIDTHS = np.geomspace(0.1, 10.0, 13)  # times the model's width of reversal, tri
 DETERMINED = 0.5  # of what was known before, that a determined number may still be uncertain by
 ROUNDS = 3  # of widths and noise
 STANDS = 0.05  # share of the samples in which a joint must move for its friction to be fitted
-
-
-@dataclass(frozen=True)
-class FittedNumber:
-    """A number of the model, before and after, with its standard deviation."""
-
-    key: str
-    drive: str
-    before: float
-    after: float
-    std: float
-    unit: str
 
 
 Fitted = tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]

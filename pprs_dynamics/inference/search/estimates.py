@@ -21,14 +21,12 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.regression.sensitivities import Number
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import AXES, AddedBody
-from pprs_dynamics.system.json_records import JsonRecord
 
 DETERMINED = 0.5  # of a coefficient's prior variance, below which the recordings determine it
 # Of the usual precision, for the centre of a body about which the set says nothing.
@@ -45,20 +43,23 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Calibration(JsonRecord, Number):
-    """A number of the model that was moved within its tolerance.
+class FittedNumber:
+    """A number of the model, before and after a fit, with its standard deviation.
 
     Parameters
     ----------
-    after, std : float
-        Its fitted value and standard deviation.
+    key, drive : str
+        Drive '' where the key says all.
+    before, after, std : float
+    unit : str
     """
 
-    json_keys = ('key', 'before', 'after', 'std', 'unit')
-    json_attributes = (('key', 'label'), ('before', 'value'))
-
+    key: str
+    drive: str
+    before: float
     after: float
     std: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -410,10 +411,10 @@ def estimate_present(fits: FittedSets, fitted: CandidateSet, effect: CatalogueEf
     return parameters
 
 
-def calibrations(fits: FittedSets, fitted: CandidateSet) -> list[Calibration]:
+def calibrations(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedNumber, ...]:
     """Return the numbers of the model as the fit moves them within their tolerances."""
     fit = fitted.fit
-    return [Calibration(
-        **vars(column.number), after=column.value(float(fit.coefficients[k])),
-        std=float(np.sqrt(fit.covariance[k, k])) * column.number.deviation)
-        for k, column in enumerate(fits.design.base) if isinstance(column, ModelNumber)]
+    return tuple(FittedNumber(
+        column.number.label, '', column.number.value, column.value(float(fit.coefficients[k])),
+        float(np.sqrt(fit.covariance[k, k])) * column.number.deviation, column.number.unit)
+        for k, column in enumerate(fits.design.base) if isinstance(column, ModelNumber))
