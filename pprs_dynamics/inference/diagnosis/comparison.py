@@ -240,8 +240,10 @@ class Comparison(JsonRecord):
         worst = max(beyond, key=lambda drive: drive.unexplained)
         where = name_drives([drive.drive for drive in beyond], list(self.drives))
         most = f', most on {worst.drive}' * (len(beyond) > 1)
-        return (f'{error}. On {where} it is more than noise{most}: '
-                f'{in_unit(worst.unexplained, worst.unit)} unexplained ({worst.grade}).')
+        is_known = any(drive.noise_floor is not None for drive in beyond)
+        what = 'it is more than noise' if is_known else 'the noise is not known'
+        return (f'{error}. On {where} {what}{most}: {in_unit(worst.unexplained, worst.unit)}'
+                f'{" unexplained" * is_known} ({worst.grade}).')
 
     @property
     def overall(self) -> dict[str, float]:
