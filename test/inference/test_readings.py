@@ -191,6 +191,13 @@ def test_recorded_velocities_decide_between_units_of_positions(
         f.line + str(f.scales) for f in found if isinstance(f, OtherReading))
 
 
+def test_magnitudes_with_a_bit_for_their_sign_are_told_of_all_drives(arm: DriveModel) -> None:
+    time, q, _, effort = run(4)
+    effort += np.random.default_rng(6).normal(0, [0.0, 0.4], q.shape)
+    load = np.round(np.abs(effort) * 900 / np.abs(effort).max(axis=0)) + 1024 * (effort < 0)
+    assert told(arm, time, q, load).startswith('the effort of all drives looks like a magnitude')
+
+
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
     time, q, v, effort = run()
     (tmp_path / 'arm.urdf').write_text(ARM)

@@ -257,22 +257,27 @@ def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> 
 
 def find_sign_bit(recording: Recording) -> Iterator[OtherReading]:
     """Yield efforts that are magnitudes with a bit for their sign, as servos report loads."""
-    found: dict[int, list[int]] = {}
-    for d, column in enumerate(recording.effort.T):
-        effort = column[np.isfinite(column)]
-        if len(effort) < 2 or np.any(effort < 0) or np.any(effort % 1 != 0):
-            continue
-        rough = table.CALMER * np.abs(np.diff(effort)).sum()
-        for bit in table.SIGN_BITS:
-            if 0.02 < np.mean(effort >= 2.0 ** bit) < 0.98 and effort.max() < 2.0 ** (bit + 1) and (
-                    np.abs(np.diff(signed(effort, bit))).sum() < rough):
-                found.setdefault(bit, []).append(d)
-    for bit, group in found.items():
-        yield OtherReading.of(
-            'effort_sign_bit', recording.drives, group,
-            f'the effort of {named(recording.drives, tuple(group))} looks like a magnitude whose '
-            f'sign is bit {bit} ({2 ** bit})',
-            scales=tuple((recording.drives[d], 'effort_sign_bit', float(bit)) for d in group))
+    efforts = {d: column[np.isfinite(column)] for d, column in enumerate(recording.effort.T)}
+    counts = {d: effort for d, effort in efforts.items()
+              if len(effort) > 1 and np.all(effort >= 0) and np.all(effort % 1 == 0)}
+    for bit in table.SIGN_BITS:
+        # Servos of one robot report alike: what one shows is true of all.
+        group = [d for d, effort in counts.items() if effort.max() < 2.0 ** (bit + 1)]
+        if any(_has_sign(counts[d], bit) for d in group):
+            yield OtherReading.of(
+                'effort_sign_bit', recording.drives, group,
+                f'the effort of {named(recording.drives, tuple(group))} looks like a magnitude '
+                f'whose sign is bit {bit} ({2 ** bit})',
+                scales=tuple((recording.drives[d], 'effort_sign_bit', bit) for d in group))
+            return
+
+
+def _has_sign(effort: Array, bit: int) -> bool:
+    """Return whether efforts hardly change where a bit does, if it is their sign."""
+    above = effort >= 2.0 ** bit
+    at = np.flatnonzero(np.diff(above))
+    steps, raw = (np.abs(np.diff(values)[at]).sum() for values in (signed(effort, bit), effort))
+    return bool(0.02 < np.mean(above) < 0.98 and steps < table.CALMER * raw)
 
 
 def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evidence: Evidence,

@@ -42,7 +42,7 @@ SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
 OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SIGN_BITS = range(7, 16)  # of magnitudes
-CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
+CALMER = 0.5  # changes where the bit does, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
