@@ -21,7 +21,6 @@ from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
     Likelihood,
-    Shares,
     effort_contents,
     in_reading,
     read_motion,
@@ -248,7 +247,7 @@ class Search:
                 return [Fit(rows[0].after(self.rows[0])), self.start]
         # The inertia of a drive without weight may be invented, a unit of its efforts not.
         evidence, scales = self.evidence(best.reading), best.reading.effort_scale
-        if best.residual > table.GOOD_FIT or evidence is None or not self._is_certain(best) or not (
+        if best.residual > table.GOOD_FIT or evidence is None or not (
                 self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))):
             return []
         rivals = self._rivals(best)
@@ -412,20 +411,6 @@ class Search:
         found &= moves | (not np.any(moves & found))
         return [d for d in np.flatnonzero(found).tolist()
                 if evidence.is_measured(d, reading.efforts[d])]
-
-    def _is_certain(self, fit: Fit) -> bool:
-        """Whether friction says the same as weight of efforts that are negated.
-
-        Weight and inertia of a wrong model may be negative, friction may not.
-        """
-        reading, evidence = fit.reading, self.evidence(fit.reading)
-        if evidence is None or not np.any(reading.effort_scale < 0):
-            return evidence is not None
-        moves = evidence.moves(self.model)
-        found = [Shares.of(evidence, d, int(reading.efforts[d])) for d in self._measured(
-            reading, self.excerpts[reading.time_unit], evidence)
-            if reading.effort_scale[d] < 0 and moves[d]]
-        return bool(sum(np.sign(some.friction) for some in found if some.has_friction) <= 0)
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes."""

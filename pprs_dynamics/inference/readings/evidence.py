@@ -164,9 +164,6 @@ class Evidence:
         misfit = 0.5 * ((found - mean) / width) ** 2
         # Masses are off by factors.
         misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
-        if abs(scale) != 1 and np.all(misfit[:2][moves] > table.MASSES_MOST):
-            # Neither weight nor inertia has this unit.
-            return Likelihood(-table.MASSES_MOST, table.MASSES_MOST, 1.0)
         cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves])
                      + np.sum(misfit[2:]))
         # Friction beyond some times the rigid body's forces is unlikely.
