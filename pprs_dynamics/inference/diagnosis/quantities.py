@@ -33,10 +33,10 @@ def with_uncertainty(value: float, std: float, unit: str, size: float | None = N
     return f'{rounded:.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
 
 
-def in_fitting_unit(values: Sequence[float], unit: str, digits: int = 2) -> str:
-    """Return 'a' or 'a to b' of sizes with so many digits, in a unit that fits the largest."""
+def in_fitting_unit(values: Sequence[float], unit: str) -> str:
+    """Return 'a' or 'a to b' of sizes with two digits, in a unit that fits the largest."""
     factor, name = _fitting_unit(max(values), unit)
-    return ' to '.join(dict.fromkeys(plain(value * factor, digits) for value in values)) + name
+    return ' to '.join(dict.fromkeys(plain(value * factor, 2) for value in values)) + name
 
 
 def _fitting_unit(size: float, unit: str) -> tuple[float, str]:
@@ -48,21 +48,19 @@ def _fitting_unit(size: float, unit: str) -> tuple[float, str]:
     return factor, name if name in ('', '°') else f' {name}'
 
 
-def as_fitted(value: float, std: float, unit: str, scale: float, size: float | None = None,
-              ) -> str:
+def as_fitted(value: float, std: float, unit: str, scale: float, size: float) -> str:
     """Return a fitted value as `with_uncertainty` does; that it is none where it may be anything.
 
     `scale` is the size that matters.
     """
-    known = max(abs(value) if size is None else size, ANYTHING * scale)
-    if INTERVAL * std > known:
+    if INTERVAL * std > max(size, ANYTHING * scale):
         return 'not determined by this motion'
     return with_uncertainty(value, std, unit, size)
 
 
-def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:
-    """Return an effort with as many digits and its unit, never as a power of ten."""
-    return f'{measured(value, digits)} {unit}'
+def in_unit(value: float, unit: str = 'N') -> str:
+    """Return an effort and its unit, never as a power of ten."""
+    return f'{measured(value)} {unit}'
 
 
 def plain(value: float, digits: int = 3) -> str:
