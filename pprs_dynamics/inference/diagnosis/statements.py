@@ -33,7 +33,7 @@ UNITS = {
 }
 TURNING = {'position': (180 / np.pi, 'deg'), 'velocity': (1.0, 'rad/s'),
            'acceleration': (1.0, 'rad/s²'), 'load': (1.0, 'N m')}
-SHOWN = 2  # digits of forces and of ends of ranges, which are known to some percent
+SHOWN = 2  # digits of forces, which are known to some percent
 # Possible causes, and how to look, by what the error depends on.
 LEADS = {
     'position': ('a dent, dirt or a joint in the guide or screw; something that touches there',
