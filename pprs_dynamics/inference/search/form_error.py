@@ -149,14 +149,18 @@ class FormErrors:
         forces : mapping, optional
             Of `forces`, where it is known.
         """
+        at_reversals = (isinstance(candidate, EffectCandidate)
+                        and candidate.effect.shows_at_reversals)
         if isinstance(candidate, EffectCandidate) and not (
-                candidate.effect.idealised or candidate.effect.shows_at_reversals):
+                candidate.effect.idealised or at_reversals):
             return 0.0, ()  # little looks like masses, gravity and sensors
         share = self.decisions.form_share / SHAPES ** 0.5
         square, names = 0.0, dict[str, None]()
         for d, (effects, white) in (self.forces(fitted) if forces is None else forces).items():
             others = [k for k, other in enumerate(effects) if d in drives
-                      and other is not candidate and (len(drives) > 1 or _is_free(other))]
+                      and other is not candidate and (len(drives) > 1 or _is_free(other))
+                      # The form of a spring is not off where the drive reverses.
+                      and (other.effect.is_friction or not at_reversals)]
             total = white[others].sum(axis=0)
             square += share ** 2 * float(total @ total)
             names |= dict.fromkeys(effects[k].name for k in others)
