@@ -4,8 +4,9 @@
 """Constraints on the coefficients of a set: linear inequalities, solved at once.
 
 - Each parameter is within the bounds of its effect.
-- No drive has less than no inertia, viscous, dry or load friction, the model's own included; no
-  gear loses less where its motor drives than where the load does.
+- No drive has less than no inertia, viscous, dry or load friction, the model's own included, in any
+  state: cold or warm, creeping or after a reversal. No gear loses less where its motor drives than
+  where the load does.
 - An added body is a body, and a link from which one is taken away remains one.
 
 Inequalities of the first two kinds are linear. Possible bodies form a convex set, which tangent
@@ -19,7 +20,7 @@ inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,7 @@ from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import REACH, reach_of
 from pprs_dynamics.inference.search.candidates import Component
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
     FORCES,
     VISCOUS,
@@ -40,7 +42,10 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
 )
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
+from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import KEPT, MOMENTS, AddedBody, with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
@@ -65,6 +70,16 @@ ADDS_TO: Mapping[tuple[str, str], tuple[Total, ...]] = {
        for name, way in zip(VISCOUS, BOTH, strict=True)},
     **{(AsymmetricFriction.name, name): ((DRY_FRICTION, way),)
        for name, way in zip(FORCES, BOTH, strict=True)}}
+# Friction of some states: of what it is a part there, and the coefficient whose column has the
+# largest share. What builds up after a reversal is then lacking.
+IN_SOME_STATES: Mapping[tuple[str, str], tuple[str, str, float]] = {
+    (StribeckFriction.name, 'force'): (DRY_FRICTION, 'force', 1.0),
+    (StribeckFriction.name, 'coefficient'): (LOAD_FRICTION, 'force', 1.0),
+    (FrictionDrift.name, 'force'): (DRY_FRICTION, 'force', 1.0),
+    (FrictionDrift.name, 'worked'): (DRY_FRICTION, 'worked', 1.0),
+    (FrictionDrift.name, 'thinned'): (VISCOUS_FRICTION, 'worked', 1.0),
+    (Hysteresis.name, 'force'): (DRY_FRICTION, 'force', -0.5),
+    (Hysteresis.name, 'coefficient'): (LOAD_FRICTION, 'force', -0.5)}
 
 # Of a body's size: how far inside the set of possible bodies a plane is, so that few planes
 # suffice; and what rounding may violate.
@@ -86,7 +101,8 @@ class Constraints:
     def __init__(self, design: Design) -> None:
         self.design = design
         self._bounds: dict[Component, Array] = {}
-        self._totals: dict[tuple[int, str], float] = {}
+        self._totals: dict[tuple[int, Total], float] = {}
+        self._shares: dict[Hashable, float] = {}
         self._planes: dict[tuple[Component, float], BodyPlanes] = {}
 
     def applied(self, regression: Regression, fit: JointFit, blocks: Mapping[Component, Block],
@@ -187,19 +203,30 @@ class Constraints:
         bounds = np.concatenate([self._bounds_of(component) for component in places], axis=1)
         rows, least = [unit, -unit], [bounds[0], -bounds[1]]
         totals: dict[tuple[int, Total], tuple[Array, float]] = {}
+        in_states: list[tuple[int, Total, Array, float]] = []
         for component, place in places.items():
+            given = _given(component)
             for more, less in component.effect.at_least.items():
                 if {more, less} <= {*component.names}:
                     order = np.zeros(len(component.names))
                     order[[component.names.index(key) for key in (more, less)]] = 1.0, -1.0
                     rows.append(order[None] @ unit[place])
-                    least.append(-order[None] @ _given(component))
+                    least.append(-order[None] @ given)
             if (d := component.drive) is None:
                 continue
             for k, name in enumerate(component.names):
                 for total in ADDS_TO.get((component.effect.name, name), ()):
-                    row, own = totals.get((d, total), (np.zeros(size), self.own(d, total[0])))
-                    totals[d, total] = (row + unit[place.start + k], own + _given(component)[k])
+                    row, own = totals.get((d, total), (np.zeros(size), self.own(d, total)))
+                    totals[d, total] = (row + unit[place.start + k], own)
+                if (component.effect.name, name) in IN_SOME_STATES:
+                    of, column, sign = IN_SOME_STATES[component.effect.name, name]
+                    share = sign * self._largest(component, column)
+                    in_states += [(d, (of, way), share * unit[place.start + k], share * given[k])
+                                  for way in (('',) if of == LOAD_FRICTION else BOTH)]
+        for d, of_state, part, there in in_states:
+            row, own = totals.get((d, of_state), (np.zeros(size), self.own(d, of_state)))
+            rows.append((row + part)[None])
+            least.append(np.array([-own - there]))
         for row, own in totals.values():
             rows.append(row[None])
             least.append(np.array([-own]))
@@ -222,11 +249,34 @@ class Constraints:
             self._bounds[component] = bounds - _given(component)
         return self._bounds[component]
 
-    def own(self, drive: int, of: str) -> float:
-        """Return the inertia or friction that the input model has in a drive, without effects."""
-        if (drive, of) not in self._totals:
-            self._totals[drive, of] = own_total(self.design, drive, of)
-        return self._totals[drive, of]
+    def _largest(self, component: Component, name: str) -> float:
+        """Return the largest size of a column of an effect on a drive in the recordings."""
+        key = component.effect, component.drive, component.shape, name
+        if key not in self._shares:
+            term = self.design.find_term(component.effect, component.drive, component.parameters)
+            self._shares[key] = float(np.abs(
+                term.rows[component.drive or 0][term.names.index(name)]).max())
+        return self._shares[key]
+
+    def own(self, drive: int, total: Total) -> float:
+        """Return the inertia or friction that the input model has in a drive."""
+        if (drive, total) not in self._totals:
+            friction, variables = self.design.given.friction, self.design.residuals.variables
+            if total[0] == INERTIA:
+                own = _own_inertia(self.design, drive)
+            elif total[0] == DRY_FRICTION:
+                load = variables.get('load', np.zeros((1, len(self.design.drives))))
+                own = float(friction.dry(np.median(np.abs(load), axis=0))[drive])
+            else:
+                of_each = (friction.viscous if total[0] == VISCOUS_FRICTION
+                           else friction.coefficient)
+                own = float(of_each[drive])
+            for (name, coefficient), totals in ADDS_TO.items():
+                effect = catalogue()[name]
+                if total in totals and (values := self.design.present(effect, drive)):
+                    own += effect.to_coefficients(values)[coefficient]
+            self._totals[drive, total] = own
+        return self._totals[drive, total]
 
 
 def _places(fit: JointFit, blocks: Mapping[Component, Block],
@@ -246,20 +296,6 @@ def _given(component: Component) -> Array:
     known = dict(zip((c.name for c in component.effect.coefficients), component.given,
                      strict=False))
     return np.array([known.get(name, 0.0) for name in component.names])
-
-
-def own_total(design: Design, drive: int, of: str) -> float:
-    """Return the inertia or friction that the input model has in a drive without its effects."""
-    if of == INERTIA:
-        return _own_inertia(design, drive)
-    friction = design.given.friction
-    whole = {VISCOUS_FRICTION: friction.viscous, LOAD_FRICTION: friction.coefficient}
-    if of in whole:
-        return float(whole[of][drive])
-    usual = np.zeros(len(design.drives))
-    if 'load' in design.residuals.variables:
-        usual = np.median(np.abs(design.residuals.variables['load']), axis=0)
-    return float(friction.dry(usual)[drive])
 
 
 def _own_inertia(design: Design, drive: int) -> float:
