@@ -445,7 +445,7 @@ class AdoptionRun(JsonRecord):
     Parameters
     ----------
     steps : tuple of Adoption
-        Answers, effect by effect.
+        Answers, effect by effect; refused ones come last.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
         Why the run ended.
     reason : str
@@ -475,8 +475,9 @@ def adopt_all(
 ) -> AdoptionRun:
     """Adopt the effects that one diagnosis reports, in the values that they have together.
 
-    Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
-    error, and which of them it is another recording must show.
+    What is refused is tried again after another effect was adopted. Of effects that explain the
+    recordings alike, the best is adopted as the last: it lowers the error, and which of them it is
+    another recording must show.
 
     Parameters
     ----------
@@ -505,15 +506,25 @@ def adopt_all(
         diagnosis = diagnose(given, recordings, (), lambda share: report('diagnosing', share),
                              reference=reference)
     rivals = {names[0] for names in diagnosis.indistinguishable}
+    open_effects = sorted(diagnosis.effects, key=lambda effect: effect.name in rivals)
     steps: list[Adoption] = []
+    refused: list[Adoption] = []
     adopted: list[FoundEffect] = []
-    for effect in sorted(diagnosis.effects, key=lambda effect: effect.name in rivals):
-        report(f'adopting {effect.name}', len(steps) / len(diagnosis.effects))
-        steps.append(adopt(model, EffectRequest(effect.effect, effect.drives), recordings, validate,
-                           diagnosis=diagnosis, reference=reference, beside=adopted))
-        if steps[-1].adopted:
-            model = record(steps[-1])
+    while len(refused) < len(open_effects):
+        # First what was not refused beside the effects that are adopted already.
+        effect = open_effects[len(refused)]
+        report(f'adopting {effect.name}', len(adopted) / len(diagnosis.effects))
+        step = adopt(model, EffectRequest(effect.effect, effect.drives), recordings, validate,
+                     diagnosis=diagnosis, reference=reference, beside=adopted)
+        if step.adopted:
+            model = record(step)
+            steps.append(step)
             adopted.append(effect)
+            open_effects.remove(effect)
+            refused = []
+        else:
+            refused.append(step)
+    steps += refused
     return AdoptionRun(tuple(steps), *_end(diagnosis, steps), model)
 
 
