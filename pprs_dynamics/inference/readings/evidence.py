@@ -284,8 +284,7 @@ class Shares:
     viscous, dry : float
         Friction, over the swing of the effort; the former with its sign.
     friction, friction_by_chance : float
-        Both together, negative where they drive the motion; and the friction that the residual
-        alone would show.
+        Both together, and the friction that the residual alone would show.
     residual, noise : float
         Residual, and fast noise, over the swing of the effort.
     """
@@ -321,10 +320,9 @@ class Shares:
         fast = noise * float(np.sqrt(count)) / max(residual, 1e-300) if noise < np.inf else 0.0
         slow = float(np.sqrt(np.clip(1 - fast ** 2, table.CERTAIN ** 2 / count, 1.0)))
         viscous, dry = found[2] * parts[2], found[3] * parts[3]
-        friction = float(np.linalg.norm(viscous + dry) * np.sign((viscous + dry) @ parts[2]))
         return cls(found[0], slow * doubts[0], share, slow * doubt,
                    float(np.sign(found[2]) * np.linalg.norm(viscous)) / swing,
-                   float(np.linalg.norm(dry)) / swing, friction / swing,
+                   float(np.linalg.norm(dry)) / swing, float(np.linalg.norm(viscous + dry)) / swing,
                    residual * float(np.sqrt(2 / count)) / swing, residual / swing,
                    noise * float(np.sqrt(count)) / swing)
 
@@ -355,8 +353,7 @@ class Shares:
     @property
     def has_friction(self) -> bool:
         """Whether friction is part of it."""
-        return abs(self.friction) > max(table.LEAST_FRICTION,
-                                        table.CERTAIN * self.friction_by_chance)
+        return self.friction > max(table.LEAST_FRICTION, table.CERTAIN * self.friction_by_chance)
 
     @property
     def kind(self) -> str:
