@@ -387,7 +387,6 @@ class Diagnosis(JsonRecord):
         return explained_shares(self.residuals)
 
 
-
 @dataclass(frozen=True)
 class DetectableSize:
     """The smallest size at which an effect would have been reported, by drive or structure.

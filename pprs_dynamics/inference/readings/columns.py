@@ -365,7 +365,7 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
     used = [place for block in layout.blocks.values() for place in block]
     unused = [place for place in range(len(series)) if place not in used]
     taken = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
-            for kind, places in layout.blocks.items()]
+             for kind, places in layout.blocks.items()]
     notes.append('no header: ' + ', '.join(taken) + (
         f'; {_span(series, unused)} not used' if unused else ''))
     return {key: column for key, column in read(layout.blocks).items() if key not in stamp}

@@ -197,8 +197,7 @@ class LinkMotion:
         return position
 
     def wrenches(self, load: StructureLoad | None) -> list[tuple[int, Array]]:
-        """Return joints to whose links a load is applied, and wrenches about their origins, (N, 6).
-        """
+        """Return joints whose links bear a load, and wrenches about their origins, (N, 6)."""
         t, m = self.structure.tables, self.motion
         found: list[tuple[int, Array]] = []
         if load is None:

@@ -175,7 +175,7 @@ class Mechanism:
         return next((joint.joints for joint in self.passive_joints if joint.name == name), (name,))
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                      ) -> JointFriction:
+                       ) -> JointFriction:
         """Return friction of joints as `MechanismState.friction_efforts` takes it.
 
         Parameters
