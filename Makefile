@@ -52,12 +52,12 @@ LIMIT := --timeout 300 --durations 40
 # Nodes run in real time and mostly wait: they have the processor when they want it, and all else
 # calculates meanwhile, in files by name, the dear ones of `app` and `inference` first.
 # PYTEST has more options for both.
-test: $(VENV)/.test lint
-	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
+test: $(VENV)/.test
+	$(MAKE) --jobs 3 --output-sync=target lint test-nodes test-others
 
 test-nodes: $(VENV)/.test
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(LIMIT) \
-	    --junitxml build/test-nodes.xml $(PYTEST)
+	$(BIN)/python -m pytest $$(grep -rl 'mark\.nodes' test --include 'test_*.py') -n 2 \
+	    --dist loadfile -m 'nodes and not slow' $(LIMIT) --junitxml build/test-nodes.xml $(PYTEST)
 
 test-others: $(VENV)/.test
 	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
@@ -76,8 +76,8 @@ fuzz: $(VENV)/.test
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
-	$(BIN)/mypy
 	$(BIN)/python docs/prose.py
+	nice -n 10 $(BIN)/mypy
 
 # -W: a warning is an error; all of them are shown first.
 docs: $(VENV)/.docs

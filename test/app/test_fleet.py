@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import signal
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,10 +14,11 @@ import numpy as np
 import pandas
 import pytest
 from documents import checked
+from work_apart import work
 from workbench_bench import AXIS, write_axis
 
+from pprs_dynamics.app.commands import survey
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.app.commands.survey import cluster, run_each
 from pprs_dynamics.app.fleet.recordings import (
     COLUMNS,
     ManifestError,
@@ -147,17 +146,14 @@ def test_a_survey_writes_documented_columns_and_does_nothing_twice(
     assert rows.error.notna().sum() == 1
 
 
-def work(item: str) -> str:
-    if item == 'kills':
-        os.kill(os.getpid(), signal.SIGKILL)
-    return item
-
-
-def test_of_a_worker_that_is_killed_only_the_item_that_kills_it_is_lost() -> None:
+def test_of_a_worker_that_is_killed_only_the_item_that_kills_it_is_lost(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('distributed')
-    with cluster(1) as client:
+    monkeypatch.setattr(survey, 'ALLOWED_FAILURES', 0)  # a worker takes seconds to start
+    with survey.cluster(1) as client:
         found = {}
-        for item, done, error in run_each(client, work, ['first', 'second', 'kills', 'last']):
+        items = ['first', 'second', 'kills', 'last']
+        for item, done, error in survey.run_each(client, work, items):
             found[item] = done, error
             time.sleep(0.3)  # what is written slowly is not taken for lost
     assert 'KilledWorker' in found.pop('kills')[1]

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from workbench_bench import HIDDEN, write_hidden
+from work_apart import end, fail, sleep
+from workbench_bench import AXIS, HIDDEN, write_axis, write_hidden
 
 from pprs_dynamics import DriveModel, compare
 from pprs_dynamics.app.commands.pprs import main
@@ -170,29 +170,31 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
 
 
 def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
-    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 10.0) for seed in (1, 2))
-    session = Session.open([recording], validation=[other])
+    spring = {'axis.stiffness': 300.0, 'axis.position': 0.01}
+    recording, other = (write_axis(tmp_path / f'{seed}.csv', seed, drive_spring=spring)
+                        for seed in (1, 2))
+    session = Session.open([recording], AXIS, validation=[other])
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)
     assert session.jobs.diagnosis is not None
-    noise = compare(DriveModel.load(), recording).comparison.drives
+    noise = compare(DriveModel.load(AXIS), recording).comparison.drives
     for name, error in session.errors().items():
         assert error.noise == pytest.approx(noise[name].noise_floor, rel=1e-6)
-    refused = session.jobs.adopt('drive_spring').result(300)
+    refused = session.jobs.adopt('quadratic_friction').result(300)
     assert not refused.adopted
     assert 'explains these recordings better' in refused.reason
     assert dict(session.ticks.model.values) == given
-    session.ticks.tick('payload_mass')
+    session.ticks.tick('drive_spring')
     session.ticks.tick('coulomb_friction')
-    adopted = session.jobs.adopt('payload_mass').result(300)
+    adopted = session.jobs.adopt('drive_spring').result(300)
     assert adopted.adopted, adopted.reason
     assert adopted.held_out_on == 'validation'
     assert set(session.ticks.view.ticks) == {'coulomb_friction'}
-    assert steps_of(session) == ['payload_mass']
+    assert steps_of(session) == ['drive_spring']
     session.export(tmp_path / 'adopted.yaml')
     assert [step.effect for step in read_steps(DriveModel.load(
         tmp_path / 'adopted.yaml').values)] == [
-        'payload_mass']
+        'drive_spring']
     found = compared(tmp_path, recording, tmp_path / 'adopted.yaml')
     for name, error in session.errors().items():
         assert error.before == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
@@ -200,26 +202,11 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) ->
     assert dict(session.ticks.model.values) == given
 
 
-def sleep(seconds: float, progress: Any) -> str:
-    for _ in range(int(100 * seconds)):
-        progress(0.5)
-        time.sleep(0.01)
-    return 'slept'
-
-
-def fail(progress: Any) -> None:
-    raise SessionError('the value is 1, must be 2')
-
-
-def end(progress: Any) -> None:
-    os._exit(3)
-
-
 def test_work_apart_answers_fails_and_is_ended() -> None:
     shares: list[float] = []
     assert run_in_process(sleep, 0.5, report=shares.append) == 'slept'
     assert 0.5 in shares
-    with pytest.raises(SessionError, match='must be 2'):
+    with pytest.raises(PprsError, match='must be 2'):
         run_in_process(fail, report=shares.append)
     with pytest.raises(EndedError, match='status 3'):
         run_in_process(end, report=shares.append)

@@ -18,6 +18,7 @@ from single_axis import axis, axis_recording
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.inference.adoption import adopt as adopting
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption, LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -63,13 +64,21 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
         write_recording(folder / f'{recording.name}.csv', recording)
     model, new = folder / 'model.yaml', folder / 'new.yaml'
     write_model(model, robot.model.values)
-    done = pprs('adopt', HIDDEN, folder / 'first.csv', '--validate', folder / 'second.csv',
-                '--model', model, '--output', new, '--json', folder / 'answer.json',
-                '--report', folder / 'page.html')
+    made: list[Diagnosis] = []
+
+    def noted(*arguments: Any, **options: Any) -> Diagnosis:
+        made.append(diagnose(*arguments, **options))
+        return made[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(adopting, 'diagnose', noted)
+        done = pprs('adopt', HIDDEN, folder / 'first.csv', '--validate', folder / 'second.csv',
+                    '--model', model, '--output', new, '--json', folder / 'answer.json',
+                    '--report', folder / 'page.html')
     assert done.returncode == 0, done.stdout + done.stderr
     return Files(folder, model, folder / 'first.csv', folder / 'second.csv', robot.recordings()[1],
-                 new, json.loads((folder / 'answer.json').read_text()),
-                 done.stdout, recordings, diagnose(robot.model, recordings[:1]))
+                 new, json.loads((folder / 'answer.json').read_text()), done.stdout, recordings,
+                 *made)
 
 
 def error_on(model: Path, recording: Recording) -> float:

@@ -27,10 +27,12 @@ HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
 AXIS = Path(__file__).parents[2] / 'config' / 'single_axis.yaml'
 
 
-def write_axis(path: Path, seed: int, duration: float = 8.0, friction: float = 6.0) -> Path:
-    """Write a recording of the single axis with Coulomb friction that its model lacks [N]."""
+def write_axis(path: Path, seed: int, duration: float = 8.0, friction: float = 6.0,
+               **more: dict[str, float]) -> Path:
+    """Write a recording of the single axis with effects that its model lacks, friction in [N]."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    robot = with_effects(DriveModel.load(AXIS), {'coulomb_friction': {'axis.force': friction}})
+    robot = with_effects(DriveModel.load(AXIS),
+                         {'coulomb_friction': {'axis.force': friction}, **more})
     write_recording(path, axis_recording(robot, seed, 1.0, time=np.arange(0.0, duration, STEP)))
     return path
 
