@@ -16,7 +16,6 @@ import shutil
 import sys
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from scipy.signal import butter, filtfilt
 
@@ -27,9 +26,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
-
-matplotlib.use('Agg')
-from matplotlib import pyplot
 
 PAGE = ROOT / 'docs' / 'closed_chain.md'
 FREE = 'free_one_b.csv.gz'
@@ -113,7 +109,10 @@ def draw() -> None:
     loaded = type(model).from_parameters({**model.values, **values, 'effects.active': active},
                                          source=model.source)
     recording = read_recording(f'{name}.csv.gz', model.recorded)
-    figure, axes = pyplot.subplots(figsize=(7.5, 2.8), layout='constrained')
+    from matplotlib.figure import Figure  # tests import the rest of this file
+
+    figure = Figure(figsize=(7.5, 2.8), layout='constrained')
+    axes = figure.subplots()
     for shown, label, colour in ((model, 'without the weight', '#999999'),
                                  (loaded, 'with the reported body', '#0072B2')):
         residuals = measure_residuals(shown, [recording])[0]

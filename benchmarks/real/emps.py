@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from scipy.signal import butter, decimate, filtfilt
 
@@ -28,9 +27,6 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
-
-matplotlib.use('Agg')
-from matplotlib import pyplot
 
 DOCS = ROOT / 'docs'
 # The authors' recipe: Butterworth of order 4 at 100 Hz to and fro, central differences, every tenth
@@ -187,7 +183,10 @@ def _ending(name: str, outcome: AdoptionRun) -> list[str]:
 
 def draw(story: Story, path: Path) -> None:
     """Draw the error over velocity and over time, before and after."""
-    figure, axes = pyplot.subplots(2, 1, figsize=(10, 7), layout='constrained')
+    from matplotlib.figure import Figure  # tests import the rest of this file
+
+    figure = Figure(figsize=(10, 7), layout='constrained')
+    axes = figure.subplots(2, 1)
     models = {'published': story.model, 'with asymmetric_friction': story.asymmetric.after,
               'after the loop': story.gated.model}
     for (name, model), colour in zip(models.items(), ('#999999', '#0072B2', '#D55E00'),

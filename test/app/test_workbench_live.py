@@ -29,26 +29,24 @@ from pprs_dynamics.ros.messages.conversions import RobotNames
 
 pytestmark = pytest.mark.nodes
 
-START = 1_700_000_000_000_000_000  # [ns]
-THINNED = 5  # of the recorded samples one is published: 100 Hz
+START, STEP = 1_700_000_000_000_000_000, 20_000_000  # [ns]
 
 
 class Replay:
     """Publishes a recording as joint states, in real time, again and again onwards."""
 
-    def __init__(self, recording: Recording, topic: str = '/joint_states',
-                 thinned: int = THINNED) -> None:
+    def __init__(self, recording: Recording, topic: str) -> None:
         self.context = Context()
         rclpy.init(context=self.context)
         self.node = Node('replay', context=self.context)
         self.publisher = self.node.create_publisher(JointState, topic, 100)
-        self.recording, self.thinned = recording, thinned
+        self.recording = recording
         self.ends = threading.Event()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
     def _run(self) -> None:
-        rows = np.arange(0, len(self.recording.time), self.thinned)
+        rows = range(0, len(self.recording.time), 2)  # 50 Hz
         stamp, began, sent = START, time.monotonic(), 0
         while True:
             stamp += 1_000_000_000  # a gap: the motion begins anew
@@ -58,9 +56,9 @@ class Replay:
                     self.recording.position[row], RobotNames(self.recording.drives, ''))
                 message.velocity = []
                 self.publisher.publish(message)
-                stamp += 10_000_000
+                stamp += STEP
                 sent += 1
-                if self.ends.wait(max(0.0, began + 0.01 * sent - time.monotonic())):
+                if self.ends.wait(max(0.0, began + 1e-9 * STEP * sent - time.monotonic())):
                     return
 
     def close(self) -> None:
@@ -82,7 +80,7 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
             stack.enter_context(node_process(
                 [executable(name), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left'],
                 ros_domain, tmp_path / f'{name}.log'))
-        replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states', 1)
+        replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states')
         stack.callback(replay.close)
         bench = stack.enter_context(workbench(
             '--live', '--model', model, '--ros-args', '-r', '__ns:=/left', folder=tmp_path))

@@ -23,8 +23,8 @@ pytestmark = needs_browser
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('page')
-    write_hidden(folder / 'run.csv', 1)
-    write_hidden(folder / 'other.csv', 2)
+    write_hidden(folder / 'run.csv', 1, 5.0)
+    write_hidden(folder / 'other.csv', 2, 5.0)
     return folder
 
 
@@ -186,7 +186,7 @@ def test_a_file_that_is_dropped_is_opened_and_one_that_is_none_is_a_sentence(
     page: Page, folder: Path,
 ) -> None:
     names = [recording['name'] for recording in page.settled()['recordings']]
-    dropped = write_hidden(folder / 'dropped.csv', 3)
+    dropped = write_hidden(folder / 'dropped.csv', 3, 5.0)
     drop = '''([name, text]) => { const files = new DataTransfer();
         files.items.add(new File([text], name));
         document.body.dispatchEvent(

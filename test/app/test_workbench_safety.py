@@ -69,14 +69,13 @@ def test_a_token_is_good_once_and_a_wrong_one_never(bench: Workbench, folder: Pa
     assert bench.send('GET', f'/?token={new}', cookie='a=b').status == 403
 
 
-def test_the_cookie_is_for_this_page_alone(folder: Path) -> None:
-    with workbench('--model', AXIS, folder / 'run.csv', folder=folder) as other:
-        cookie = other.enter().headers['Set-Cookie'].lower()
-        assert 'httponly' in cookie
-        assert 'samesite=strict' in cookie
-        line = other.process.stdout.readline()  # type: ignore[union-attr]
-        assert f'http://127.0.0.1:{other.port}/?token=' in line
-        assert other.token not in line
+def test_the_cookie_is_for_this_page_alone(bench: Workbench) -> None:
+    cookie = bench.entered.headers['Set-Cookie'].lower()
+    assert 'httponly' in cookie
+    assert 'samesite=strict' in cookie
+    line = bench.process.stdout.readline()  # type: ignore[union-attr]
+    assert f'http://127.0.0.1:{bench.port}/?token=' in line
+    assert bench.token not in line
 
 
 @pytest.mark.parametrize('host', ['evil.example', 'evil.example:{port}', '127.0.0.1',

@@ -25,7 +25,7 @@ UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
 def unrelated(model: DriveModel, seed: int = 5) -> Recording:
     """Return a recording whose first effort follows nothing that the drives do."""
-    made = record(model, motion(10.0))
+    made = record(model, motion(6.0))
     rng = np.random.default_rng(seed)
     knots = rng.normal(size=len(made.time) // 40 + 2) * UNRELATED
     effort = made.effort.copy()

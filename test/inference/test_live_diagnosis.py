@@ -189,7 +189,7 @@ def test_no_stream_of_stamps_raises():
     model = DriveModel.load()
     rng = np.random.default_rng(4)
     position = model.drive_forces(Excitation(4.0, seed=3).motion([1.0])).mechanism.position[0]
-    for _ in range(200):
+    for _ in range(100):
         steps = rng.choice([1e-9, 1e-4, 0.01, 0.05, 1.0, -0.5, 0.0], 60,
                            p=rng.dirichlet(np.full(7, 0.3)))
         comparison = LiveComparison(model)

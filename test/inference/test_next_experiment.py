@@ -18,6 +18,7 @@ from model_recordings import record, with_effects
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.experiments import motion_design
 from pprs_dynamics.inference.experiments.motion_design import (
     MotionLimits,
     Motions,
@@ -26,7 +27,6 @@ from pprs_dynamics.inference.experiments.motion_design import (
 )
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
 from pprs_dynamics.inference.experiments.next_experiment import (
-    COMMISSION,
     FittedTerm,
     Information,
     PurposeError,
@@ -144,8 +144,11 @@ def test_white_noise_counts_samples() -> None:
 # Limits and search.
 
 
-def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel) -> None:
+def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
+    model: DriveModel, monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Every limit in turn is made the one that stops the motion."""
+    monkeypatch.setattr(motion_design, 'STEPS', 40)
     tight = DriveModel.from_parameters({
         **model.values, 'limits.lift_stroke': (0.12, 0.30),
         'limits.effort': (9.0,) * 3 + (18.0,) * 3, 'limits.condition_number': 2.2,
@@ -155,7 +158,7 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel
     def size(series: JointSeries) -> float:
         return float(np.abs(series.coefficients).sum())
 
-    drawn = motions.drawn(1)
+    drawn = motions.drawn(1, 10)
     found = design_motion(motions, drawn, size, 1)
     assert 0.8 < max(motions.uses(found).values()) <= 1.0
     assert size(found) > max(map(size, drawn))
@@ -188,7 +191,6 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
 
 # Motions that excite an arm: within its limits, at rest at both ends, and worth their time.
 
-ARM_DURATION = 12.0
 CORNER = 0.03  # share of a period in which the speed changes
 NOISE = 1.5  # [N m, N], white: so much that the corners do not tell
 
@@ -198,31 +200,29 @@ def arm_model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     return arm.real_arm(tmp_path_factory.mktemp('arm'))
 
 
-@pytest.fixture(scope='module')
-def found(arm_model: DriveModel):
-    return next_experiment(arm_model, (), COMMISSION, duration=ARM_DURATION, seed=1)
+def played(path: Path) -> JointMotion:
+    """Return the motion of a CSV file."""
+    table = pd.read_csv(path)
+    return JointMotion(*(table[[f'{joint}/{name}' for joint in arm.JOINTS]].to_numpy()
+                         for name in ('position', 'velocity', 'acceleration')),
+                       table['time'].to_numpy())
 
 
-def test_it_keeps_the_limits_with_their_margin(arm_model: DriveModel, found) -> None:
-    motion = found.motion(np.linspace(0, ARM_DURATION, 5001))
-    tree = arm_model.robot.structure
+def test_the_command_writes_what_a_controller_can_play_within_the_limits(
+    arm_model: DriveModel, tmp_path: Path,
+) -> None:
+    path, answer = tmp_path / 'arm.yaml', tmp_path / 'next.json'
+    write_model(path, arm_model.values, arm_model.source)
+    assert main(['next-experiment', '--model', str(path), '--purpose', 'commission', '--output',
+                 str(tmp_path / 'next.csv'), '--json', str(answer)]) == 0
+    motion, tree = played(tmp_path / 'next.csv'), arm_model.robot.structure
+    assert len(motion.position) == 2001
     assert np.all(np.abs(motion.position) <= 0.901 * np.minimum(tree.upper, np.pi))
     assert np.all(np.abs(motion.velocity) <= 0.901 * tree.speed)
     assert np.all(np.abs(motion.acceleration) <= 0.901 * 5.0)
     assert np.all(np.abs(arm_model.drive_forces(motion).total) <= 0.91 * tree.effort)
-    assert max(found.limits.values()) <= 1.001
-
-
-def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:
-    path = str(arm.write_arm(tmp_path))
-    output, answer = str(tmp_path / 'next.csv'), tmp_path / 'next.json'
-    assert main(['next-experiment', '--model', path, '--purpose', 'commission', '--output', output,
-                 '--json', str(answer)]) == 0
-    table = pd.read_csv(output)
-    assert len(table) == 2001
-    assert {f'{joint}/{name}' for joint in arm.JOINTS
-            for name in ('position', 'velocity', 'acceleration')} < set(table.columns)
     told = json.loads(answer.read_text())
+    assert max(told['limits'].values()) <= 1.001
     assert 0 < told['determined'] <= told['total']
 
 
@@ -268,14 +268,10 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
     assert max(told['limits'].values()) <= 1.001
     assert 'N m' in page.read_text()
     # The promise is kept: the rival falls behind in a diagnosis of both runs.
-    table = pd.read_csv(output)
-    moved = JointMotion(*(table[[f'{joint}/{name}' for joint in arm.JOINTS]].to_numpy()
-                          for name in ('position', 'velocity', 'acceleration')),
-                        table['time'].to_numpy())
     real = DriveModel.from_parameters({**arm_model.values, 'friction.viscous': tuple(
         np.add(arm_model.values['friction.viscous'], (0, 6.0, 0)))}, arm_model.source)
     second = tmp_path / 'second.csv'
-    write_recording(second, arm.record(real, moved, NOISE, seed=1))
+    write_recording(second, arm.record(real, played(output), NOISE, seed=1))
     found = diagnose(arm_model, [read_recording(one_speed, arm_model.drives),
                                  read_recording(second, arm_model.drives)])
     assert [effect.name for effect in found.effects] == ['viscous_friction']

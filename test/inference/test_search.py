@@ -27,10 +27,12 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 MODEL = DriveModel.load()
-TIME = np.arange(0, 12.0, 0.005)
-def recording_of(effects: dict[str, dict[str, float]], noise: float = 0.08) -> Recording:
+
+
+def recording_of(effects: dict[str, dict[str, float]], noise: float = 0.08,
+                 duration: float = 12.0) -> Recording:
     """Return a recording of the paper's robot with effects."""
-    return record(with_effects(MODEL, effects), noise, time=TIME)
+    return record(with_effects(MODEL, effects), noise, time=np.arange(0, duration, 0.005))
 
 
 def names(found: CandidateSet) -> list[str]:
@@ -98,7 +100,7 @@ def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
 def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
     """Both frictions of joints are less than a tenth of the drag, of which no form is known."""
     recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
-                              'joint_friction': {'revolute.viscous': 0.02}}, 0.02)
+                              'joint_friction': {'revolute.viscous': 0.02}}, 0.02, 8.0)
     table = tabulate(MODEL, [recording], DECISIONS)
     assert names(table.best.fitted) == ['tool_drag']
     assert any('joint_friction may be the form error of tool_drag' in found.barred

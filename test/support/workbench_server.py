@@ -71,11 +71,10 @@ class Workbench:
         connection.close()
         return answer
 
-    def enter(self) -> Answer:
+    def enter(self) -> None:
         """Exchange the token for a cookie."""
-        answer = self.send('GET', f'/?token={self.token}', cookie='')
-        self.cookie = answer.headers['Set-Cookie'].partition(';')[0]
-        return answer
+        self.entered = self.send('GET', f'/?token={self.token}', cookie='')
+        self.cookie = self.entered.headers['Set-Cookie'].partition(';')[0]
 
     def get(self, path: str) -> Answer:
         return self.send('GET', path)
