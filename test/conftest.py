@@ -67,7 +67,7 @@ def running() -> Iterator[Any]:
         yield probe
 
 
-@pytest.fixture(scope='module')
+@pytest.fixture(scope='session')
 def browser() -> Iterator[Any]:
     """Chromium."""
     from browser import chromium
