@@ -26,7 +26,7 @@ from pprs_dynamics.errors import MotionError
 
 # Compiled, sums may be associated otherwise; forces of up to 40 N then differ by some 1e-14.
 AGREEMENT = 1e-12
-SAMPLES = 100
+SAMPLES = 40
 VARIANTS: dict[str, dict[str, Any]] = {
     'corrected': {}, 'printed': {'equations': 'printed'},
     'widths': {'friction.reversal_rate': 0.3},

@@ -54,6 +54,16 @@ class Cell:
             PATH.motion(times), conversions.time(start),
             [round((moment - first) * 1e9) for moment in times]))
 
+    def forget(self) -> None:
+        """Begin anew with what was received."""
+        for received in (self.trajectories, self.commands, self.setpoints, self.bench.status):
+            received.clear()
+
+    def clock_stands(self) -> bool:
+        """Return whether the node has said that ROS time does not advance."""
+        return any(status['code'] == 'STALE' and 'ROS time does not advance' in status['message']
+                   for status in self.bench.status)
+
     def ready(self) -> None:
         assert self.bench.spin_until(self.publisher.get_subscription_count)
         assert self.bench.connected()
@@ -163,22 +173,28 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
     with node_process(feedforward('-p', 'use_sim_time:=true'), ros_domain, tmp_path / 'log'):
         cell.ready()
         assert clock.heard()
-        start, lasts = clock.now, PATH.duration + 0.1 - 3.0  # 1.8 s of simulated time
-        cell.send(3.0, PATH.duration + 0.1, round(start * 1e9))
-        assert cell.bench.spin_until(lambda: cell.setpoints)
-        while clock.now - start < 0.4:
-            clock.tick(0.02, 0.02)
-        if stands:
-            # Whoever follows single commands is held where the path was when the clock stopped.
-            assert cell.bench.spin_until(lambda: len(cell.commands) == 2)
-            assert cell.bench.spin_until(lambda: cell.bench.status[-1]['code'] == 'STALE')
-            assert 'ROS time does not advance' in cell.bench.status[-1]['message']
-            where = 3.0 + clock.now - start
-            check_held(cell, where - 0.02, where + 0.02, begin=3.0)
-            assert len(cell.trajectories) == 1
-            return
-        while clock.now - start < lasts - 0.1:
-            clock.tick(0.5 * SELDOM, SELDOM)
+        # A machine that loads kernels, or another process, may let the node stand still itself.
+        assert cell.bench.spin_until(lambda: not cell.bench.status[-1]['preparing'])
+        lasts = PATH.duration + 0.1 - 3.0  # 1.8 s of simulated time
+        for _ in range(5):
+            cell.forget()
+            start = clock.now
+            cell.send(3.0, PATH.duration + 0.1, round(start * 1e9))
+            assert cell.bench.spin_until(lambda: cell.setpoints)
+            while clock.now - start < 0.4:
+                clock.tick(0.02, 0.02)
+            if stands:
+                # Whoever follows single commands is held where the path was when the clock stopped.
+                assert cell.bench.spin_until(lambda: len(cell.commands) == 2)
+                assert cell.bench.spin_until(cell.clock_stands)
+                where = 3.0 + clock.now - start
+                check_held(cell, where - 0.02, where + 0.02, begin=3.0)
+                assert len(cell.trajectories) == 1
+                return
+            while clock.now - start < lasts - 0.1:
+                clock.tick(0.5 * SELDOM, SELDOM)
+            if not cell.clock_stands():  # by a node that heard nothing for a second
+                break
         # In the middle of the path nothing but the answer to the message has gone out.
         assert [len(messages) for messages in (cell.commands, cell.setpoints, cell.trajectories)
                 ] == [1, 1, 1]
