@@ -73,20 +73,6 @@ def test_importing_the_package_imports_nothing_heavy(code: str, unwanted: set[st
     assert not modules_after(code) & unwanted
 
 
-def test_a_comparison_says_where_the_model_fails(compared: ComparisonResult) -> None:
-    table = compared.table()
-    assert table['rms'].idxmax() == 'slide_2'
-    assert table.loc['slide_2', 'rms'] > 3 * table.loc['slide_2', 'noise']
-    others = table.drop('slide_2')
-    # White noise of 0.05 N, less what the smoothing takes off.
-    assert (others['rms'] < 0.06).all()
-    assert compared.where[0].drive == 'slide_2'
-    # The table is the numbers of the residuals, pooled.
-    error = compared.residuals.error
-    assert compared.rms == pytest.approx(np.sqrt(np.nanmean(error ** 2)))
-    assert table['rms'].to_numpy() == pytest.approx(np.sqrt(np.nanmean(error ** 2, axis=0)))
-
-
 def test_the_command_writes_the_dictionary_and_prints_the_text(
     compared: ComparisonResult, folder: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

@@ -65,13 +65,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     model, new = folder / 'model.yaml', folder / 'new.yaml'
     write_model(model, robot.model.values)
     made: list[Diagnosis] = []
-
-    def noted(*arguments: Any, **options: Any) -> Diagnosis:
-        made.append(diagnose(*arguments, **options))
-        return made[0]
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(adopting, 'diagnose', noted)
+        patch.setattr(adopting, 'diagnose', lambda *arguments, **options: made.append(
+            diagnose(*arguments, **options)) or made[0])
         done = pprs('adopt', HIDDEN, folder / 'first.csv', '--validate', folder / 'second.csv',
                     '--model', model, '--output', new, '--json', folder / 'answer.json',
                     '--report', folder / 'page.html')

@@ -29,8 +29,6 @@ from pprs_dynamics.inference.experiments.motion_design import design as design_m
 from pprs_dynamics.inference.experiments.next_experiment import (
     FittedTerm,
     Information,
-    PurposeError,
-    next_experiment,
     whitened,
 )
 from pprs_dynamics.inference.regression.base_columns import (
@@ -182,11 +180,6 @@ def test_no_room_is_said(model: DriveModel) -> None:
     weak = replace(model, limits=model.limits.with_efforts((1.0,) * 6))
     with pytest.raises(NoMotionError, match=r'no motion is allowed.*effort of lift'):
         Motions(weak, MotionLimits(), DURATION)
-
-
-def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
-    with pytest.raises(PurposeError, match='no recording is given'):
-        next_experiment(model)
 
 
 # Motions that excite an arm: within its limits, at rest at both ends, and worth their time.

@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-import io
 import re
 import shlex
 from dataclasses import replace
+from html import unescape
 from typing import Any
 
 import made_up_diagnosis as made
 import pytest
 from made_up_recordings import judged, measured
-from rich.console import Console
 
 from pprs_dynamics.app.api.adopt import AdoptionRunResult
 from pprs_dynamics.app.api.diagnose import diagnosis_page, diagnosis_view
@@ -72,13 +71,6 @@ def test_values_are_read_with_the_digits_that_are_known(
     assert with_uncertainty(value, std, unit) == text
 
 
-def printed(diagnosis: Diagnosis, width: int, details: bool) -> str:
-    file = io.StringIO()
-    Console(file=file, width=width).print(diagnosis_view(
-        diagnosis, word_diagnosis(diagnosis), details))
-    return file.getvalue()
-
-
 def in_one_line(text: str) -> str:
     return re.sub(r'[\s│]+', ' ', text)
 
@@ -90,14 +82,14 @@ def test_a_row_shows_a_fall_of_the_error_that_three_digits_hide() -> None:
 
 
 @pytest.mark.parametrize('make', [ambiguous, everything])
-def test_with_details_the_terminal_shows_everything_within_its_width(make: Any) -> None:
+def test_the_terminal_keeps_its_width_and_the_page_shows_everything(make: Any) -> None:
     diagnosis = make()
     words = word_diagnosis(diagnosis)
     assert len(re.findall(r'[.;](?: |$)', words.headline)) <= 2
-    text = printed(diagnosis, 80, details=True)
+    text = as_text(diagnosis_view(diagnosis, words, next_step=False), 80)
     assert max(map(len, text.splitlines())) <= 80
-    assert '…' not in text, 'nothing is cut off'
-    shown = in_one_line(text)
+    assert words.headline in in_one_line(text)
+    shown = unescape(diagnosis_page(diagnosis, words, ['a.csv']).html())
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
                      *words.refuted, *words.warnings):
         assert sentence in shown

@@ -48,7 +48,7 @@ from pprs_dynamics.physics.model.model_writer import write_model
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import Figure
 
-MOST_SHOWN = 6  # values without --details
+MOST_SHOWN = 6  # values in the terminal
 MOST_REMARKS = 2
 
 

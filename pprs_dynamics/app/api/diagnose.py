@@ -22,7 +22,6 @@ from pprs_dynamics.app.report.terminal import (
     shell_command,
     stacked,
     text_table,
-    titled_table,
     verdict_panel,
 )
 from pprs_dynamics.arrays import Array
@@ -56,13 +55,13 @@ if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
-MOST_EFFECTS = 4  # rows and values without --details
-MOST_PLACES = 2  # of an unexplained error without --details
+MOST_EFFECTS = 4  # rows and values in the terminal
+MOST_PLACES = 2  # of an unexplained error in the terminal
 HEADINGS = 'effect', 'on', 'error', 'held out [std]', 'evidence'
 CAPTION = ('Effects, largest error reduction first. Error: on the drive where it falls most. '
            'Held out: standard errors by which held-out data are predicted better.')
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
-ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
+ELSEWHERE = '[dim]Evidence, confirmation and all values: --report FILE.html[/]'
 METHOD = (
     'Model and measured effort are filtered alike. Every effect of the catalogue is a column of '
     'one regression, in each shape and on each drive, together with the free numbers of the model.',
@@ -75,38 +74,36 @@ TitledTable = tuple[str, str, PlainTable]
 """Title, note, and headings with rows."""
 
 
-def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
-                   next_step: bool = True) -> Any:
-    """Return the diagnosis for the terminal, most important first.
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, next_step: bool = True) -> Any:
+    """Return the diagnosis for the terminal, most important first, in at most 25 lines.
 
     Parameters
     ----------
     diagnosis : Diagnosis
     words : Sentences
         The diagnosis in words.
-    details : bool
-        Everything, instead of at most 25 lines of 80 columns.
     next_step : bool
         Whether the next command is printed.
     """
     parts = [verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline),
              *(f'[blue]i[/] {escape(text)}' for text in words.reference),
-             *(_details if details else _brief)(diagnosis, words)]
+             *_brief(diagnosis, words)]
     if next_step:
         parts.append(f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}')
         parts += [shell_command(words.command)] if words.command else []
-    return stacked(*parts, *(() if details else (ELSEWHERE,)))
+    return stacked(*parts, ELSEWHERE)
 
 
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield the first effects with their values, the runner-up and the first warning."""
     if diagnosis.effects:
         rows, values = effect_rows(diagnosis), value_rows(diagnosis)
-        yield _effects_table(diagnosis, rows[:MOST_EFFECTS], frame='none')
+        yield text_table(*plain_rows((HEADINGS, rows[:MOST_EFFECTS])), right=(2, 3, 4),
+                         whole=(0, 3, 4), frame='none')
         for effect, drive, text in values[:MOST_EFFECTS]:
             yield escape(f'  {f"{effect} on {drive}" if drive else effect}: {text}')
         if len(rows) > MOST_EFFECTS or len(values) > MOST_EFFECTS:
-            yield f'  … all {len(rows)} rows and {len(values)} lines of values: --details'
+            yield f'  … all {len(rows)} rows and {len(values)} lines of values: --report FILE.html'
     for statement in diagnosis.depends_on[:MOST_PLACES]:
         yield escape(f'  {statement.text}')
     if second := runner_up(diagnosis):
@@ -117,30 +114,6 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield f'[blue]i[/] {escape(words.refuted[0])}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
-
-
-def _details(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
-    """Yield every effect, finding, table and list."""
-    if diagnosis.effects:
-        yield f'[bold]{CAPTION}[/]'
-        yield _effects_table(diagnosis, effect_rows(diagnosis), frame='head')
-    for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
-        yield f'[bold]{number}. {escape(finding.title)}[/]'
-        yield _labelled([*finding_lines(finding), ('confirm', finding.confirm)], 8)
-        yield ''
-    for title, note, table in (*_values(diagnosis), *_alternatives(diagnosis), *_unseen(diagnosis)):
-        yield titled_table(title, table, right=())
-        yield f'[dim]{escape(note)}[/]'
-    for title, lines in (*_lists(words), ('Warnings', words.warnings)):
-        if lines:
-            yield f'[bold]{title}[/]'
-            yield from (_labelled([('-', line)], 1) for line in lines)
-            yield ''
-
-
-def _effects_table(diagnosis: Diagnosis, rows: Sequence[Sequence[str]], **options: Any) -> Any:
-    return text_table(*plain_rows((HEADINGS, rows)), right=(2, 3, 4),
-                      whole=(0, 3, 4), **options)
 
 
 def _values(diagnosis: Diagnosis) -> Iterator[TitledTable]:
@@ -196,18 +169,6 @@ def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     return [(effect.name, drive, text) for effect in diagnosis.effects
             for drive, text in word_values(effect.effect, effect.parameters, effect.moments,
                                            diagnosis.residuals.drives).items()]
-
-
-def _labelled(lines: Sequence[tuple[str, str]], width: int) -> Any:
-    """Return lines of text, each after its label."""
-    from rich.table import Table
-
-    grid = Table.grid(padding=(0, 1))
-    grid.add_column(style='bold', width=width)
-    grid.add_column(ratio=1)
-    for label, text in lines:
-        grid.add_row(label, escape(text))
-    return grid
 
 
 def finding_lines(finding: Finding) -> list[tuple[str, str]]:
@@ -370,9 +331,9 @@ class DiagnosisResult(Result):
         """The model with the reported effects, without the checks of `adopt`."""
         return self.diagnosis.adopted
 
-    def view(self, details: bool = False, next_step: bool = True) -> Any:
+    def view(self, next_step: bool = True) -> Any:
         """Return the diagnosis for the terminal, with or without the next command."""
-        return diagnosis_view(self.diagnosis, self._words, details, next_step)
+        return diagnosis_view(self.diagnosis, self._words, next_step)
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""

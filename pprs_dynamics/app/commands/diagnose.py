@@ -26,8 +26,6 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_shared(parser, 'recordings', 'topic', 'as-it-is', 'validate', 'reference', 'report')
-    parser.add_argument('--details', action='store_true',
-                        help='print all findings, tables and values')
     parser.add_argument('--adopt-all', action='store_true', help='add the reported effects')
     add_shared(parser, 'output', required=False, output='model file that --adopt-all writes')
 
@@ -36,8 +34,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     require_output(options, 'adopt-all')
     screen, result = answer(diagnose, options, reference=options.reference)
-    show(result, options, screen,
-         view=result.view(options.details, next_step=not options.adopt_all))
+    show(result, options, screen, view=result.view(next_step=not options.adopt_all))
     return _adopt_all(result, options, screen) if options.adopt_all else 0
 
 
