@@ -16,12 +16,12 @@ from model_recordings import record
 from pprs_command import pprs
 from single_axis import axis, axis_recording
 
-from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption import adopt as adopting
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption, LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.adoption.request import requested as requesting
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -34,7 +34,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters, read_
 
 HIDDEN, WRONG = 'coulomb_friction', 'drive_spring'
 DURATION = 10.0  # [s]
-NOISE = 0.05  # [N], of recordings made without the simulated robot
+NOISE = 0.05  # [N]
 
 
 @dataclass
@@ -56,14 +56,12 @@ class Files:
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp('adopt')
-    robot = adoption.Robot(adoption.Case(
-        'effects', (HIDDEN,), 7, 3.0, width=1.0, duration=DURATION))
-    recordings = robot.recordings()
-    robot.effects = []
-    for recording in recordings:
-        write_recording(folder / f'{recording.name}.csv', recording)
+    robot = axis({HIDDEN: {'force': 1.2}})
+    recordings = axis_recording(robot, 1), axis_recording(robot, 2)
+    for name, recording in zip(('first', 'second'), recordings, strict=True):
+        write_recording(folder / f'{name}.csv', recording)
     model, new = folder / 'model.yaml', folder / 'new.yaml'
-    write_model(model, robot.model.values)
+    write_model(model, axis().values, 'config/single_axis.yaml')
     made: list[Diagnosis] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(adopting, 'diagnose', lambda *arguments, **options: made.append(
@@ -72,9 +70,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
                     '--model', model, '--output', new, '--json', folder / 'answer.json',
                     '--report', folder / 'page.html')
     assert done.returncode == 0, done.stdout + done.stderr
-    return Files(folder, model, folder / 'first.csv', folder / 'second.csv', robot.recordings()[1],
-                 new, json.loads((folder / 'answer.json').read_text()), done.stdout, recordings,
-                 *made)
+    return Files(folder, model, folder / 'first.csv', folder / 'second.csv',
+                 axis_recording(axis(), 2), new, json.loads((folder / 'answer.json').read_text()),
+                 done.stdout, recordings, *made)
 
 
 def error_on(model: Path, recording: Recording) -> float:
@@ -111,11 +109,12 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
 
 
 def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
-    return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1],
-                 validation, diagnosis=files.diagnosis, **options)
+    model = DriveModel.load(files.model)
+    return adopt(model, requesting(text, model), files.recordings[:1], validation,
+                 diagnosis=files.diagnosis, **options)
 
 
-@pytest.mark.parametrize('effect', [WRONG, 'payload_mass'])
+@pytest.mark.parametrize('effect', [WRONG, 'drive_inertia'])
 def test_a_wrong_effect_is_refused_and_the_right_one_named(files: Files, effect: str) -> None:
     answer = requested(files, effect)
     assert not answer.adopted
@@ -139,7 +138,7 @@ def test_blocks_of_the_same_recording_are_told_as_weak_evidence(files: Files) ->
 
 
 def test_force_overrides_and_is_recorded(files: Files) -> None:
-    answer = requested(files, f'{WRONG}:lift_1', force=True)
+    answer = requested(files, f'{WRONG}:axis', force=True)
     assert answer.adopted
     step, = read_steps(LedgerBook((RecordingEntry.of(files.recordings[0]),), ()).entered(
         answer).values)
@@ -202,14 +201,15 @@ def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> N
     assert len(first) == 64
 
 
-@pytest.mark.parametrize(('text', 'named'), [('coulomb_friction:slide_1,lift_1', 'slide_1'),
-                                             ('viscous_friction:slide_2', 'slide_2')])
-def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence(text: str, named: str) -> None:
+def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence() -> None:
     model, time = DriveModel.load(), np.arange(2000) * 0.004
     up_and_down = np.tile([0.0, 0.0, 0.5], (2000, 1))
     up_and_down[:, 2] += 0.04 * np.sin(2 * np.pi * time / 4) * np.sin(np.pi * time / 8) ** 2
     motion = PlatformMotion.from_poses(time, up_and_down, np.tile([0.0, 0, 0, 1], (2000, 1)))
     recording = record(model, 0.05, motion=lambda _: motion, time=time)
-    answer = adopt(model, EffectRequest.of(text), [recording])
-    assert not answer.adopted
-    assert f'{named} hardly moved in the recordings' in answer.reason
+    found = diagnose(model, [recording])
+    for text, named in (('coulomb_friction:slide_1,lift_1', 'slide_1'),
+                        ('viscous_friction:slide_2', 'slide_2')):
+        answer = adopt(model, EffectRequest.of(text), [recording], diagnosis=found)
+        assert not answer.adopted
+        assert f'{named} hardly moved in the recordings' in answer.reason

@@ -11,7 +11,6 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
-from made_once import diagnose
 from model_recordings import with_effects
 from planar_arm import planar_arm
 
@@ -19,6 +18,7 @@ from pprs_dynamics import JointMotion
 from pprs_dynamics.app.api.adopt import parameter_rows
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.body_centres import find_centre
 from pprs_dynamics.measurement.files.recording import Recording

@@ -19,6 +19,7 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnosing
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
@@ -119,7 +120,8 @@ def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     """Mass and friction that all are too small explain as well what a gain of 1.9 would."""
     loose = DriveModel.from_parameters({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
     doubled = recorded(1.9 * MODEL.drive_forces(MOVED).total)
-    names = {effect.name for effect in diagnose(loose, [doubled]).effects}
+    found = diagnosing(loose, [doubled])
+    names = {effect.name for effect in found.effects}
     assert names
     assert 'effort_gain' not in names
     fits = FittedSets(Design.of(loose, [doubled]), DECISIONS)
@@ -128,7 +130,7 @@ def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     assert alone.coefficients(component) == pytest.approx([0.5])
     assert alone.terms.feasibility > DECISIONS.rival_margin
     assert fits.refused(alone) == [component]
-    answer = adopt(loose, EffectRequest.of('effort_gain'), [doubled])
+    answer = adopt(loose, EffectRequest.of('effort_gain'), [doubled], diagnosis=found)
     assert not answer.adopted
     assert 'values of effort_gain that fit best are impossible' in answer.reason
 
