@@ -333,7 +333,8 @@ def test_a_unit_of_efforts_that_is_not_the_si_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.effort, LOADS)
 
 
-def test_a_table_below_a_preamble_with_a_line_of_units(tmp_path: Path) -> None:
+@pytest.mark.parametrize('blank', ['', '\n'])
+def test_a_table_below_a_preamble_with_a_line_of_units(blank: str, tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path)
     columns = {joint: {'position': f'{joint} deg', 'effort': f'{joint} f N'}
                for joint in arm.JOINTS}
@@ -342,7 +343,7 @@ def test_a_table_below_a_preamble_with_a_line_of_units(tmp_path: Path) -> None:
     np.savetxt(run, np.column_stack([MOMENTS, ANGLES, LOADS]), delimiter=';', comments='',
                header='Log 7\nChannels;7\nRate;100;Hz\n' + ';'.join(
                    ['t', *arm.JOINTS, *(f'{joint} f' for joint in arm.JOINTS)]) + '\n'
-               + ';'.join(['s', *['deg'] * 3, *['N'] * 3]))
+               + ';'.join(['s', *['deg'] * 3, *['N'] * 3]) + blank)
     found = read_recording(run, DriveModel.load(path).recorded)
     np.testing.assert_allclose(found.position, ANGLES)
     np.testing.assert_allclose(found.effort, LOADS)

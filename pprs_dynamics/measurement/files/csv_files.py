@@ -137,9 +137,11 @@ class CsvTable:
         sample = rows[first] if first < len(rows) else []
         # The header counts where the cells below it are no numbers, as of decimal commas.
         count = len(sample if sample and is_row(first) else rows[remarks])
-        titles = [row for row in rows[max(first - 2, 0):first] if len(row) == count and any(row)]
+        end = next((k + 1 for k in range(first - 1, -1, -1) if any(rows[k])), first)
+        header = slice(max(end - 2, 0), end)  # above blank lines
+        titles = [row for row in rows[header] if len(row) == count and any(row)]
         names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
-        heads = frozenset(lines[max(first - 2, 0):first]) if names else frozenset()
+        heads = frozenset(lines[header]) if names else frozenset()
         return cls(path, separator, decimal, names, count, first, sample, heads)
 
     @property
