@@ -102,6 +102,7 @@ TITLES = {  # of a quantity: its columns, and their multiple of SI
                              'v': ('Drehzahlistwert {}', 1.0), 'tau': ('Momentenistwert {}', 1.0)},
     'short words with roles': {'x': ('tausoll{}', 1.0), 'q': ('qist{}', 1.0),
                                'tau': ('tauist{}', 1.0)},
+    'letters of axes': {'q': ('A{}', DEGREE), 'v': ('B{}', DEGREE), 'tau': ('M{}', 1.0)},
     'blanks and quotes': {'q': (' "q {}"', 1.0), 'tau': (' "tau {}"', 1.0)},
 }
 
@@ -171,11 +172,23 @@ def test_a_log_may_have_columns_of_words(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
 
 
-def test_velocities_contradict_the_unit_of_times(tmp_path: Path) -> None:
-    path, _ = written(tmp_path, {'q': ('q{}', 1.0), 'v': ('dq{}', 1.0), 'tau': ('tau{}', 1.0)})
-    path.write_text(path.read_text().replace('t [s]', 't [ms]'))
-    first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml')
-    assert any('time_scale: 1' in question for question in first.questions)
+@pytest.mark.parametrize(('speed', 'times', 'said'), [
+    (1.0, 1e-3, 'time_scale: 1000'), (1.0, 1.25, 'time_scale: 0.8'), (51.0, 1.0, '')])
+def test_velocities_have_a_unit_of_their_own_or_contradict_the_times(
+    speed: float, times: float, said: str, tmp_path: Path,
+) -> None:
+    time, q, v, effort = run_of_arm()
+    first = asked_about(tmp_path, 't,q1,q2,dq1,dq2,tau1,tau2', times * time, q, speed * v, effort)
+    assert said in ''.join(first.questions)
+    assert bool(said) or first.columns['elbow']['velocity_scale'] == pytest.approx(1 / speed, 1e-3)
+
+
+@pytest.mark.parametrize('head', ['q1,q2,dq1,dq2,tau1,tau2', ''])
+def test_velocities_in_another_unit_than_positions_show_no_rate(head: str, tmp_path: Path) -> None:
+    _, q, v, effort = run_of_arm()
+    for unit in (DEGREE, DEGREE / 6):
+        with pytest.raises(PprsError, match='give --rate HZ'):
+            asked_about(tmp_path, head, q, unit * v, effort)
 
 
 def run_of_arm(size: float = 1.0, middle: float = 0.0) -> tuple[np.ndarray, ...]:

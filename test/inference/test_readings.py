@@ -191,11 +191,24 @@ def test_recorded_velocities_decide_between_units_of_positions(
         f.line + str(f.scales) for f in found if isinstance(f, OtherReading))
 
 
-def test_magnitudes_with_a_bit_for_their_sign_are_told_of_all_drives(arm: DriveModel) -> None:
+@pytest.mark.parametrize('bit', [9, 10])
+def test_magnitudes_with_a_bit_for_their_sign_are_told_of_all_drives(
+    bit: int, arm: DriveModel,
+) -> None:
     time, q, _, effort = run(4)
     effort += np.random.default_rng(6).normal(0, [0.0, 0.4], q.shape)
-    load = np.round(np.abs(effort) * 900 / np.abs(effort).max(axis=0)) + 1024 * (effort < 0)
-    assert told(arm, time, q, load).startswith('the effort of all drives looks like a magnitude')
+    load = np.round(np.abs(effort) * 450 / np.abs(effort).max(axis=0)) + 2 ** bit * (effort < 0)
+    assert told(arm, time, q, load).startswith(
+        f'the effort of all drives looks like a magnitude whose sign is bit {bit}')
+
+
+def test_degrees_from_another_zero_are_beyond_the_limits(tmp_path: Path) -> None:
+    (tmp_path / 'arm.urdf').write_text(ARM.replace('er="3', 'er="1.5').replace('"-3"', '"-1.5"'))
+    model = first_model(tmp_path / 'arm.urdf', output=tmp_path / 'arm.yaml').model
+    time, q, _, effort = run(7)
+    found = told(model, time, np.degrees(q + np.array([0, np.pi / 2])), effort)
+    assert 'look like degrees' in found
+    assert '-90 degrees (elbow) are to be added' in found
 
 
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
@@ -274,12 +287,6 @@ def test_gravity_is_upside_down_and_bodies_that_balance_each_other_are_not(
         'links.moment'): tuple(own[:, 1:4].ravel())}, model.source)
     force = real.drive_forces(JointMotion(q, v, a, time)).total
     assert told(model, time, q, force + 0.9 * np.tanh(v / 0.005) + 0.4 * v + noise) == ''
-
-
-def test_loads_with_a_bit_for_their_sign_are_told(arm: DriveModel) -> None:
-    time, q, _, effort = run(4)
-    load = np.round(np.abs(20 * effort)) + 512 * (effort < 0)
-    assert 'sign is bit 9 (512)' in told(arm, time, q, load)
 
 
 def test_a_joint_that_moves_no_inertia_is_not_driven(tmp_path: Path) -> None:

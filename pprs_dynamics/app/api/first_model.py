@@ -240,7 +240,7 @@ def first_model(
             raise GuessError(f'{given[0]}: {error}') from None
         notes += draft.guessed
     if given and not draft.questions:
-        notes += _correct(draft, given[0])
+        notes += _correct(draft, given[0], rate)
     if by_numbers:
         draft.questions.append(
             f'the joints of {given[0].name} are matched by their numbers alone: if it is a '
@@ -253,7 +253,7 @@ def first_model(
     return draft
 
 
-def _correct(draft: FirstModel, path: Path) -> list[str]:
+def _correct(draft: FirstModel, path: Path, rate: float | None) -> list[str]:
     """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
     A mistake of a drive that comes again after its correction is a question.
@@ -269,12 +269,18 @@ def _correct(draft: FirstModel, path: Path) -> list[str]:
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
             return notes + draft.questions
         readings = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
+        if rate is None and any(reading.kind == 'rate' for reading in readings) and (
+                'rate' in draft.columns):
+            raise FirstModelError(
+                f'{path}: there is no column of times, and the recorded velocities are not in the '
+                'unit of the positions: give --rate HZ, the samples per second')
         sure = [reading for reading in readings if reading.scales and reading.kind in SURE_KINDS
                 and corrected.isdisjoint((reading.kind, drive) for drive, _, _ in reading.scales)]
         if not sure:
             # Lines for efforts that are no measurement are questions as well.
             draft.questions += [
-                mistake.what + ''.join(f': if so, write {line}' for line in lines_of([mistake]))
+                mistake.what + ''.join(f': if so, write {line}' for line in lines_of(
+                    [mistake], bool(draft.columns)))
                 for mistake in mistakes if isinstance(mistake, OtherReading) or lines_of([mistake])]
             if not any(seen.kind.startswith(('effort', 'drive_constant')) for seen in readings):
                 draft.questions += _questions_of_names(draft)

@@ -110,27 +110,26 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if found := tuple(find_sign_bit(recording)):
         return found
     search = Search(model, recording, is_first)
-    if wrong := [velocity for velocity in find_other_velocities(model, search.excerpts.get(1.0))
-                 if velocity.kind == 'rate']:
-        return tuple(wrong)
-    likely = search.likely()
-    by_reading = [findings_of(model, recording, fit.reading) for fit in likely]
-    mistakes: list[Defect] = [*by_reading[0]] if likely else []
-    if len(likely) > 1:
+    by_reading = []
+    for fit in search.likely() or [Fit(search.rows[0])]:
+        said = findings_of(model, recording, fit.reading)
+        if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
+            said += find_other_velocities(model, search.excerpt(fit.reading.time_unit))
+        by_reading.append(said)
+    # What all of them say is no question.
+    mistakes: list[Defect] = [mistake for mistake in by_reading[0] if all(
+        mistake in said for said in by_reading)]
+    by_reading = [[mistake for mistake in said if mistake not in mistakes] for said in by_reading]
+    if kinds := {mistake.kind for said in by_reading for mistake in said}:
         has_columns = model.recorded.columns is not None
-        kinds = {mistake.kind for mistakes in by_reading for mistake in mistakes}
-        kind = 'drive_order' if kinds == {'drive_order'} else 'ambiguous'
-        mistakes = [OtherReading.of(
+        kind = next((kind for kind in kinds if kind == 'rate' or len(kinds) == 1), 'ambiguous')
+        mistakes.append(OtherReading.of(
             kind, model.drives, range(len(model.drives)), ', or '.join(
-                ' and '.join(mistake.what for mistake in found) or PLAIN for found in by_reading),
-            ' or '.join(line for found in by_reading for line in lines_of(found, has_columns)))]
-    kinds = {mistake.kind for mistake in mistakes}
-    if not kinds & {'position_unit', 'position_sign'}:
-        mistakes += find_other_velocities(model, search.excerpts.get(
-            likely[0].reading.time_unit if likely else 1.0))
+                ' and '.join(mistake.what for mistake in said) or PLAIN for said in by_reading),
+            ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
     if not search.has_gain:
         mistakes += find_shares(model)
-    evidence, excerpt = search.evidence(search.rows[0]), search.excerpts.get(1.0)
+    evidence, excerpt = search.evidence(search.rows[0]), search.excerpt(1.0)
     if evidence is None or excerpt is None or any(
             isinstance(mistake, OtherReading) for mistake in mistakes):
         return tuple(mistakes)
@@ -150,16 +149,20 @@ class Search:
     recording : Recording
     is_first : bool
         Whether nobody has checked the unit of the efforts yet.
+    rate : float, optional
+        Samples per second where no times are recorded; without, that of the model file.
     """
 
-    def __init__(self, model: DriveModel, recording: Recording, is_first: bool) -> None:
-        self.model = model
-        times = _time_units(recording)
-        self.excerpts = {
-            unit: excerpt for unit in (1.0, *times) if (excerpt := excerpt_of(
-                recording, table.STRETCHES, unit)) is not None}
+    def __init__(self, model: DriveModel, recording: Recording, is_first: bool,
+                 rate: float | None = None) -> None:
+        self.model, self.recording = model, recording
+        self._excerpts: dict[float, Excerpt | None] = {}
+        columns, excerpt = model.recorded.columns, self.excerpt(1.0)
+        self.rate = columns.rate if rate is None and columns is not None else rate
+        # Recorded velocities over the derivatives of positions.
+        self.factors = {} if excerpt is None else velocity_factors(excerpt)
         turning = [units.turns for units in model.units]
-        self.rows = readings(model.drives, model.units, self._loads(), times,
+        self.rows = readings(model.drives, model.units, self._loads(), _time_units(recording),
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any.
@@ -168,8 +171,6 @@ class Search:
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.has_gain = knows_forces(model)  # without it masses and units are no evidence
         self.masses = table.MASSES if self.has_gain else np.inf
-        # Recorded velocities over the derivatives of positions.
-        self.factors = velocity_factors(self.excerpts[1.0]) if 1.0 in self.excerpts else {}
         self.start = Fit(self.rows[0])
         self.fits: list[Fit] = []
         self._evidence: dict[bytes, Evidence | None] = {}
@@ -187,11 +188,20 @@ class Search:
         most = model.bound(PayloadMass).linear[0].upper
         return [load for share in table.LOADS if (load := share * model.robot.moved_mass) < most]
 
+    def excerpt(self, unit: float) -> Excerpt | None:
+        """Return an excerpt whose times are in a unit [s]."""
+        if unit not in self._excerpts:
+            plain = self._excerpts.get(1.0)
+            # Gaps are other ones in milliseconds.
+            self._excerpts[unit] = plain.slower(unit) if plain and unit not in table.TIMES else (
+                excerpt_of(self.recording, table.STRETCHES, unit))
+        return self._excerpts[unit]
+
     def evidence(self, reading: Reading) -> Evidence | None:
         """Return the evidence of a reading; the plain motion may be followed in pieces."""
         key = reading.of_motion
         if key not in self._evidence:
-            excerpt = self.excerpts.get(reading.time_unit)
+            excerpt = self.excerpt(reading.time_unit)
             self._evidence[key] = None if excerpt is None else Evidence.of(
                 in_reading(self.model, reading), excerpt,
                 None if key == self.rows[0].of_motion else reading)
@@ -215,9 +225,13 @@ class Search:
         first = self.rows[0]
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
         self.fits = self.fits_of(first) or [Fit(first)]
+        if self._against_velocities(first):
+            self.fits += [fit for row in self._rates(first)
+                          for fit in self.fits_of(row.after(first))]
         self.start = start = self._top()
         # Without masses a gravity of any size may explain positions in another unit.
-        explains = start.reading.is_plain and self.has_gain and start.prior < table.PLAUSIBLE
+        explains = not start.reading.kinds - {'rate'} and np.all(
+            start.reading.effort_scale == 1) and self.has_gain and start.prior < table.PLAUSIBLE
         # Hardly anything may be explained better.
         if explains and start.largest_residual < table.CLOSE_FIT:
             return start
@@ -227,10 +241,11 @@ class Search:
         seed = None
         while self._top() is not seed:
             seed = self._top()
-            self.fits += [fit for row in (*self.rows[1:], *self._mounting(seed.reading))
+            self.fits += [fit for row in (*self.rows[1:], *self._mounting(seed.reading),
+                                          *self._rates(seed.reading))
                           if row.kind in tried and self._may_follow(row, seed.reading)
-                          for fit in self.fits_of(row.after(seed.reading))
-                          if self._is_credible(row, fit)]
+                          for reading in self._after(row, seed.reading)
+                          for fit in self.fits_of(reading) if self._is_credible(row, fit)]
         return self._top()
 
     def likely(self) -> list[Fit]:
@@ -241,10 +256,10 @@ class Search:
             if best.residual <= table.GOOD_FIT:
                 # Angles that explain the efforts are in the right unit, whatever limits say.
                 far &= [not units.turns for units in self.model.units]
-            rows = [row for row in self.rows if np.any(far) and row.kind == 'position_unit'
-                    and self._possible(row, self.excerpts[1.0])]
-            if rows:
-                return [Fit(rows[0].after(self.rows[0])), self.start]
+            units = [unit for row in self.rows if np.any(far) and row.kind == 'position_unit'
+                     for unit in self._after(row, self.rows[0])]
+            if units:
+                return [Fit(units[0]), self.start]
         # The inertia of a drive without weight may be invented, a unit of its efforts not.
         evidence, scales = self.evidence(best.reading), best.reading.effort_scale
         if best.residual > table.GOOD_FIT or evidence is None or not (
@@ -255,10 +270,34 @@ class Search:
 
     def _mounting(self, before: Reading) -> list[Reading]:
         """Return the row with the gravity that explains what another reading does not."""
-        excerpt = self.excerpts.get(before.time_unit)
+        excerpt = self.excerpt(before.time_unit)
         row = None if excerpt is None or MOUNTING in before.kinds or not self.has_gain else (
             mounting_in(self.model, excerpt, before))
         return [] if row is None else [row]
+
+    def _rates(self, before: Reading) -> Iterator[Reading]:
+        """Yield rows with times of which the recorded velocities are the derivatives.
+
+        Without times the velocities may be in any unit.
+        """
+        factors = [factor * before.time_unit / float(before.scale[d])
+                   for d, (factor, _) in self.factors.items()]
+        common = float(np.median(factors or [0.0]))
+        if common <= 0 or not all(near(common, (factor,)) for factor in factors):
+            return
+        units = [unit for unit in (1.0, *table.VELOCITY_UNITS) if unit > 0]
+        if self.rate is None:
+            units = [1.0] if not near(common, units) or near(common, (
+                *table.TIMES, *(1 / unit for unit in table.TIMES))) else []
+        for unit in units:
+            if not near(common, (unit,)):
+                what = 'the times were in another unit' if self.rate is None else (
+                    f'there were {float(f"{self.rate * common / unit:.3g}"):g} samples per second, '
+                    f'not {self.rate:g}')
+                yield replace(
+                    self.rows[0], kind='rate', cost=table.COST['rate'], time_unit=unit / common,
+                    what=f'the recorded velocities are {factors[0]:.4g} times the derivatives of '
+                    f'the positions, as if {what}')
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""
@@ -266,6 +305,16 @@ class Search:
             return not before.kinds
         return all(row.kind != part.kind or (row.kind == 'position_offset' and not (
             {*row.drives} & {*part.drives})) for part in before.parts)
+
+    def _after(self, row: Reading, before: Reading) -> list[Reading]:
+        """Return the possible readings that add a row to another one.
+
+        In another unit the zeros of positions may be off as well.
+        """
+        reading = row.after(before)
+        zeros = [zero.after(reading) for zero in self.rows if zero.kind == 'position_offset'] if (
+            row.kind == 'position_unit' and not self._possible(reading)) else []
+        return [found for found in (reading, *zeros) if self._possible(found)]
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
         # Symmetric robots fit nearly as well in another order of their drives.
@@ -300,8 +349,8 @@ class Search:
 
     def fits_of(self, reading: Reading) -> list[Fit]:
         """Return a reading with each scale that its efforts may have; none where it cannot be."""
-        excerpt = self.excerpts.get(reading.time_unit)
-        if excerpt is None or (reading.kinds and not self._possible(reading, excerpt)):
+        excerpt = self.excerpt(reading.time_unit)
+        if excerpt is None or (reading.kinds and not self._possible(reading)):
             return []
         cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
         if not np.isfinite(excerpt.effort).any():
@@ -412,8 +461,11 @@ class Search:
         return [d for d in np.flatnonzero(found).tolist()
                 if evidence.is_measured(d, reading.efforts[d])]
 
-    def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
+    def _possible(self, reading: Reading) -> bool:
         """Return whether a reading brings positions into the strokes."""
+        excerpt = self.excerpt(reading.time_unit)
+        if excerpt is None:
+            return False
         lower, upper = self.strokes
         with np.errstate(invalid='ignore'):
             slack = table.STROKE_SLACK * (upper - lower)
@@ -430,7 +482,7 @@ class Search:
 
     def _reach(self, reading: Reading) -> Array:
         """Return the largest positions over the ends of the strokes, (D,)."""
-        excerpt = self.excerpts.get(reading.time_unit)
+        excerpt = self.excerpt(reading.time_unit)
         if excerpt is None:
             return np.zeros(len(self.model.drives))
         reach = np.abs(read_motion(excerpt.motion, reading).position).max(axis=0)
@@ -438,7 +490,7 @@ class Search:
 
     def _outside(self, reading: Reading) -> float:
         """Return the cost of positions and speeds that are beyond their limits."""
-        excerpt = self.excerpts.get(reading.time_unit)
+        excerpt = self.excerpt(reading.time_unit)
         if excerpt is None:
             return 0.0
         motion = read_motion(excerpt.motion, reading)
@@ -452,13 +504,12 @@ class Search:
                        else table.OUTSIDE if most > table.BEYOND else 0.0)
 
     def _against_velocities(self, reading: Reading) -> float:
-        """Return the cost of units of positions that no unit of the recorded velocities suits."""
-        units = (1.0, *table.VELOCITY_UNITS)
+        """Return the cost of times and positions that no unit of the recorded velocities suits."""
         # Velocities are in the unit of the positions, or in one of their own.
-        return table.UNLIKE_VELOCITY * any(
-            scale != 1 and not near(abs(factor), (1.0,)) and not near(factor / scale, units)
-            for factor, scale in ((factor, float(reading.scale[d]))
-                                  for d, factor in self.factors.items()))
+        return table.UNLIKE_VELOCITY * (not all(
+            near(abs(factor * reading.time_unit), (1.0,), doubt) or near(
+                factor * reading.time_unit / reading.scale[d], (1.0, *table.VELOCITY_UNITS), doubt)
+            for d, (factor, doubt) in self.factors.items()))
 
 
 def _cost(scales: Sequence[float] | Array) -> float:

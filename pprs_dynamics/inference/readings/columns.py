@@ -16,7 +16,7 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.check import Fit, Search
-from pprs_dynamics.inference.readings.findings import columns_line, near
+from pprs_dynamics.inference.readings.findings import columns_line
 from pprs_dynamics.inference.readings.links import (
     Layout,
     Links,
@@ -29,6 +29,7 @@ from pprs_dynamics.inference.readings.links import (
 from pprs_dynamics.inference.readings.names import (
     fit_of_name,
     joint_in,
+    may_be,
     numbered,
     scale_of,
     unit_of,
@@ -143,20 +144,17 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
         ('time', None if time is None else time.column), ('time_fraction', fraction))
         if column is not None}
     titled = [item for item in left if item.title]
-    if titled:
-        columns, found = _by_names(titled, joints, quantity, others)
-    elif quantity:
-        columns, found = {(joint, quantity): item.column
-                          for joint, item in zip(joints, left, strict=False)}, []
-    elif model is None:
-        raise GuessError('columns without names need a model of the robot')
-    else:
+    main = quantity or POSITION
+    columns, found = _by_names(titled, joints, quantity, others) if titled else ({}, [])
+    notes += found
+    if quantity and not titled:
+        columns = {(joint, quantity): item.column
+                   for joint, item in zip(joints, left, strict=False)}
+    elif model is not None and main not in {kind for _, kind in columns}:
         count = max((len(item.values) for item in left), default=0)
         stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
-        columns, found = _by_numbers(left, joints, stamps, time is not None, rate is not None,
-                                     stamp, notes, model), []
-    notes += found
-    main = quantity or POSITION
+        columns = _by_numbers(left, joints, stamps, time is not None, rate is not None,
+                              stamp, notes, model)
     known = [joint for joint in joints if (joint, main) in columns]
     if known and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
         _ask_for_one(joints, stamp | columns, [
@@ -317,7 +315,14 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
                 has_rate: bool, stamp: Columns, notes: list[str], model: DriveModel) -> Columns:
     """Return columns without names: positions by derivatives, efforts by what explains them."""
     count, values = len(joints), np.column_stack([item.values for item in series])
-    found = layouts(values, time, count)
+    is_titled = bool(series[0].title)
+    # A column is what its name says, whatever its numbers look like.
+    found = [layout for layout in layouts(values, time, count) if not is_titled or (
+        EFFORT in layout.blocks and all(
+            may_be(series[place].title, kind) for kind, block in layout.blocks.items()
+            for place in block))]
+    if not found and is_titled:
+        return {}
     if not found:
         raise GuessError(
             f'there is no header, and {len(series)} columns without time are no blocks of {count} '
@@ -334,11 +339,9 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
         # No effort is explained better than completely.
         if fits and layout.evidence + most < max(fit.score for fit, _ in fits) - table.SURE:
             break
-        # Velocities say at which rate they are the derivatives: a rate that is given may be wrong.
-        says_rate = not has_times and layout.rate != 0 and not (
-            has_rate and near(layout.rate, (1.0, *table.VELOCITY_UNITS)))
-        for rate in [1.0] * (has_rate or not says_rate) + [layout.rate] * says_rate:
-            fits.append((_fit(model, values, time / rate, layout), layout))
+        # Velocities say at which rate they are the derivatives.
+        rate = 1.0 if has_times or has_rate else layout.rate or 1.0
+        fits.append((_fit(model, values, time / rate, layout, None if has_times else 1.0), layout))
     fits.sort(key=lambda pair: -pair[0].score)
     best, layout = fits[0]
     rivals = [other for fit, other in fits if (
@@ -366,22 +369,23 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
     unused = [place for place in range(len(series)) if place not in used]
     taken = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
              for kind, places in layout.blocks.items()]
-    notes.append('no header: ' + ', '.join(taken) + (
+    notes.append(f'no {"name of a position" if is_titled else "header"}: ' + ', '.join(taken) + (
         f'; {_span(series, unused)} not used' if unused else ''))
     return {key: column for key, column in read(layout.blocks).items() if key not in stamp}
 
 
-def _fit(model: DriveModel, values: Array, time: Array, layout: Layout) -> Fit:
-    """Return how likely a layout is."""
+def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: float | None) -> Fit:
+    """Return how likely a layout is; with a rate, if no times were recorded."""
     position = values[:, layout.blocks[POSITION]]
     known = np.isfinite(position).all(axis=1) & np.isfinite(time)
     known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
     position = running_on(position[known])
     efforts = values[known][:, layout.blocks[EFFORT]] if EFFORT in layout.blocks else (
         np.full(position.shape, np.nan))
+    velocity = values[known][:, layout.blocks[VELOCITY]] if VELOCITY in layout.blocks else None
     search = Search(model, Recording(
-        model.drives, time[known], position, None, efforts, name='',
-        segments=(slice(0, len(position)),)), is_first=True)
+        model.drives, time[known], position, velocity, efforts, name='',
+        segments=(slice(0, len(position)),)), is_first=True, rate=rate)
     fit = search.best()
     evidence = search.evidence(fit.reading)
     # A column that certainly holds inertia or weight is an effort in some unit.

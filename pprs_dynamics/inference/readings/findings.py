@@ -126,8 +126,8 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
     found = []
     for part in reading.parts:
         line, changes = '', position_scales(model, part, reading)
-        if part.kind == 'time_unit':
-            changes = (('', 'time_scale', part.time_unit),)
+        if part.time_unit != 1:
+            changes = (_time_scale(model, part.time_unit),)
         if part.kind == 'drive_order':
             changes, line = _order_scales(model, recording, reading)
         if part.gravity is not None:
@@ -166,58 +166,51 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
 
 
 def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterator[OtherReading]:
-    """Yield recorded velocities that are a multiple of the derivatives of positions.
-
-    If all are alike, they contradict the unit or rate of times, otherwise their own unit or sign.
-    """
-    factors = {} if excerpt is None else velocity_factors(excerpt)
-    common = float(np.median([*factors.values()])) if factors else 0.0
-    drives, columns = model.drives, model.recorded.columns
-    if columns is not None and common > 0 and all(
-            near(factor, [common]) for factor in factors.values()):
-        units = [*table.TIMES, *(1 / unit for unit in table.TIMES)]
-        rate, reason = columns.rate, ''
-        if rate is not None and not near(common, (1.0, *table.VELOCITY_UNITS)):
-            value = float(f'{rate * common:.3g}')
-            key, reason = 'rate', f'there were {value:g} samples per second, not {rate:g}'
-        # No velocity of an angle is in thousandths.
-        elif rate is None and all(unit.turns for unit in model.units) and near(common, units):
-            key, reason = 'time_scale', 'the times were in another unit'
-            value = (columns.time_scale or 1.0) / near(common, units)
-        if reason:
-            yield OtherReading('rate', 1, f'the recorded velocities are {common:.4g} times the '
-                               f'derivatives of the positions, as if {reason}',
-                               scales=(('', key, value),))
-            return
-    groups: dict[float, list[int]] = {}
-    for drive, factor in factors.items():
-        for wrong in table.VELOCITY_UNITS:
-            if abs(factor / wrong - 1) <= table.NEAR_ONE:
-                groups.setdefault(wrong, []).append(drive)
+    """Yield recorded velocities that are a multiple of the derivatives of positions."""
+    groups: dict[float, list[int]] = {1.0: []}
+    for drive, (factor, doubt) in ({} if excerpt is None else velocity_factors(excerpt)).items():
+        doubt_of_one = max(doubt, table.NEAR_ONE)
+        unit = near(factor, (1.0,), doubt_of_one) or near(
+            factor, (*table.VELOCITY_UNITS, *groups), doubt)
+        groups.setdefault(unit or float(f'{factor:.4g}'), []).append(drive)
+    drives = model.drives
     for factor, group in groups.items():
-        times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
-        yield OtherReading.of(
-            'velocity', drives, group, f'the recorded velocity of {named(drives, tuple(group))} '
-            f'is {times} the derivative of the position', scales=tuple(
-                (drives[k], 'velocity_scale',
-                 model.recorded.columns_of(drives[k]).velocity_scale / factor) for k in group))
+        if group and factor != 1:
+            times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
+            yield OtherReading.of(
+                'velocity', drives, group, f'the recorded velocity of {named(drives, tuple(group))}'
+                f' is {times} the derivative of the position', scales=tuple(
+                    (drives[k], 'velocity_scale', model.recorded.columns_of(
+                        drives[k]).velocity_scale / factor) for k in group))
 
 
-def near(factor: float, units: Iterable[float]) -> float:
+def near(factor: float, units: Iterable[float], doubt: float = table.RATE_OFF) -> float:
     """Return the unit to which a factor of velocities is near; 0 for none."""
-    return next((unit for unit in units if abs(factor / unit - 1) <= table.RATE_OFF), 0.0)
+    return next((unit for unit in units if abs(factor / unit - 1) <= doubt), 0.0)
 
 
-def velocity_factors(excerpt: Excerpt) -> dict[int, float]:
-    """Return recorded velocities over the derivatives of positions, of drives where they agree."""
-    found: dict[int, float] = {}
+def velocity_factors(excerpt: Excerpt) -> dict[int, tuple[float, float]]:
+    """Return recorded velocities over the derivatives of positions, of drives where they agree.
+
+    Each with its relative doubt: noise of the derivatives makes a factor smaller.
+    """
+    found = {}
     for drive, (recorded, true) in enumerate(() if excerpt.velocity is None else zip(
             excerpt.velocity.T, excerpt.motion.velocity.T, strict=True)):
         pair = np.column_stack([recorded, true])[np.isfinite(recorded)]
         (size, both), (_, other) = pair.T @ pair
-        if size * other > 0 and abs(both) >= table.ALIKE * np.sqrt(size * other):
-            found[drive] = float(both / other)
+        alike = float(both / np.sqrt(max(size * other, 1e-300)))
+        if abs(alike) >= table.ALIKE:
+            found[drive] = float(both / other), table.RATE_OFF + 1 - alike ** 2
     return found
+
+
+def _time_scale(model: DriveModel, unit: float) -> Scale:
+    """Return the key with which recorded times are in another unit [s]."""
+    columns = model.recorded.columns
+    if columns is not None and columns.rate is not None:
+        return '', 'rate', float(f'{columns.rate / unit:.3g}')
+    return '', 'time_scale', unit * ((columns and columns.time_scale) or 1.0)
 
 
 def position_scales(model: DriveModel, part: Reading, whole: Reading) -> Scales:

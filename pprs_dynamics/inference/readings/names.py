@@ -102,6 +102,14 @@ def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str,
             -float(len(key)))
 
 
+def may_be(title: str, quantity: str) -> bool:
+    """Return whether the words of a name say no other quantity."""
+    words = {*words_of(title)}
+    kinds = {kind for kind, known in table.WORDS.items() if words & {*known, f'<{kind}>'}}
+    return not words & table.OTHERS and (not kinds or quantity in kinds or (
+        quantity == EFFORT and CURRENT in kinds))
+
+
 def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
     """Return the joint whose name is among the words, where, and how long it is."""
     best: tuple[str, int, int] | None = None

@@ -42,7 +42,7 @@ SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
 OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SIGN_BITS = range(7, 16)  # of magnitudes
-CALMER = 0.5  # changes where the bit does, over those of the numbers without a sign
+CALMER = 0.8  # changes where the bit does, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
@@ -64,7 +64,7 @@ REVERSAL = 0.03
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'mounting': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
         'drive_constant': 10.0, 'load': 1.0}
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)

@@ -41,6 +41,12 @@ class Excerpt:
     effort: Array
     velocity: Array | None
 
+    def slower(self, unit: float) -> Excerpt:
+        """Return the same samples with a unit of time so many times as long."""
+        motion = replace(self.motion, velocity=self.motion.velocity / unit,
+                         acceleration=self.motion.acceleration / unit ** 2)
+        return replace(self, motion=motion, time=self.time * unit)
+
 
 def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
                ) -> Excerpt | None:
