@@ -29,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # A name that would be a script where it is not escaped.
     run = folder / '<script>alert(1)</script>.mcap'.replace('/', '')
     done = pprs('simulate', '--output', run.name, '--effect', 'coulomb_friction', '--seed', '11',
-                '--duration', '15', '--json', 'truth.json', cwd=folder)
+                '--duration', '8', '--json', 'truth.json', cwd=folder)
     assert done.returncode == 0, done.stderr
     done = pprs('compare', run, '--json', folder / 'mcap.json', '--report', folder / 'page.html')
     assert done.returncode == 0, done.stderr
