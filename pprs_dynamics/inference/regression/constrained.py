@@ -25,7 +25,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 
-MOST_ROUNDS = 1000  # of planes for a convex set
+DEPENDENT = 1e-12  # singular value of rows of length 1, below which some depend on others
+STANDS = 1e-6  # relative change of coefficients, below which violated planes do not move them
 INFEASIBLE = 1e-9  # of the norm of the least-distance problem, below which no point exists
 
 
@@ -52,105 +53,123 @@ class Inequalities:
         return Inequalities(np.concatenate((self.A, other.A)), np.concatenate((self.b, other.b)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Constrained:
     """The mode of a Gaussian under constraints.
 
     Parameters
     ----------
     coefficients : (P,) array
-    covariance : (P, P) array
-        Given that the active constraints are equalities.
     rise : float
         Squared distance from the unconstrained mode, in units of its covariance.
     active : Inequalities
         Those that hold as equalities.
+    root : (P, P) array
+        A root R of the covariance without constraints, R R^T.
+    fixed : (P, r) array
+        Orthonormal directions of R^-1 c in which the active constraints fix c.
     """
 
     coefficients: Array
-    covariance: Array
     rise: float
     active: Inequalities
+    root: Array
+    fixed: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance given that the active constraints are equalities, (P, P)."""
+        across = self.root @ self.fixed
+        found: Array = self.root @ self.root.T - across @ across.T
+        return found
 
 
-def conditioned(mean: Array, covariance: Array, A: Array, b: Array) -> Constrained:
+def conditioned(mean: Array, root: Array, active: Inequalities) -> Constrained:
     """Return a Gaussian given A c = b; rows of A that depend on others count once.
 
     Parameters
     ----------
     mean : (P,) array
-    covariance : (P, P) array
-    A : (n, P) array
-    b : (n,) array
+    root : (P, P) array
+        Of the covariance, see `root_of`.
+    active : Inequalities
     """
-    across = covariance @ A.T
-    among = A @ across
-    size = np.sqrt(np.maximum(np.diag(among), 1e-300))
-    inverse = np.linalg.pinv(among / np.outer(size, size), 1e-12, hermitian=True)
-    inverse /= np.outer(size, size)
-    missing = b - A @ mean
-    return Constrained(mean + across @ (inverse @ missing),
-                       covariance - across @ inverse @ across.T,
-                       float(missing @ inverse @ missing), Inequalities(A, b))
+    G, wanted = _whitened(mean, root, active)
+    # Of the rows and not of their products: bodies have moments that no motion shows, a million
+    # times as uncertain as others, and their planes differ by the others alone.
+    U, values, V = np.linalg.svd(G, full_matrices=False)
+    kept = values > DEPENDENT
+    fixed = V[kept].T
+    moved = fixed @ (U[:, kept].T @ wanted / values[kept])
+    return Constrained(mean + root @ moved, float(moved @ moved), active, root, fixed)
 
 
-def constrained(mean: Array, covariance: Array, inequalities: Inequalities) -> Constrained | None:
+def constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constrained | None:
     """Return the mode of a Gaussian where A c >= b; None where no point satisfies that.
 
     Parameters
     ----------
     mean : (P,) array
-    covariance : (P, P) array
+    root : (P, P) array
+        Of the covariance, see `root_of`.
     inequalities : Inequalities
     """
     A, b = inequalities.A, inequalities.b
     if np.all(A @ mean >= b):
-        return Constrained(mean, covariance, 0.0, Inequalities.none(len(mean)))
+        return conditioned(mean, root, Inequalities.none(len(mean)))
     from scipy.optimize import nnls  # here: commands that fit nothing start without it
 
-    scale, L = _root(covariance)
-    G = (A * scale) @ L
-    size = np.maximum(np.linalg.norm(G, axis=1), 1e-300)
-    G, wanted = G / size[:, None], (b - A @ mean) / size
+    G, wanted = _whitened(mean, root, inequalities)
     # In units of the largest violation, so that the last element of the problem is of order 1.
-    unit = float(np.max(wanted))
-    problem = np.vstack((G.T, wanted / unit))
-    target = np.append(np.zeros(len(L)), 1.0)
-    weights = nnls(problem, target, maxiter=50 * (len(b) + len(L)))[0]
+    problem = np.vstack((G.T, wanted / float(np.max(wanted))))
+    target = np.append(np.zeros(len(mean)), 1.0)
+    weights = nnls(problem, target, maxiter=50 * sum(G.shape))[0]
     if float(np.linalg.norm(problem @ weights - target)) < INFEASIBLE:
         return None
     # The active constraints hold to rounding as equalities; NNLS has them to its tolerance.
     active = weights > 0
-    return conditioned(mean, covariance, A[active], b[active])
+    return conditioned(mean, root, Inequalities(A[active], b[active]))
 
 
-def nearest(mean: Array, covariance: Array, inequalities: Inequalities,
-            planes: Callable[[Array], Inequalities]) -> Constrained | None:
+def nearest(mean: Array, root: Array, inequalities: Inequalities,
+            planes: Callable[[Array], Inequalities], below: float = np.inf) -> Constrained | None:
     """Return the mode of a Gaussian within inequalities and a convex set; None for an empty set.
 
     Parameters
     ----------
     mean : (P,) array
-    covariance : (P, P) array
+    root : (P, P) array
+        Of the covariance, see `root_of`.
     inequalities : Inequalities
     planes : callable
         Returns, for coefficients, inequalities of the set that they violate; none within it.
+    below : float
+        A rise from which on None is returned.
     """
-    found: Constrained | None = constrained(mean, covariance, inequalities)
-    for _ in range(MOST_ROUNDS):
-        if found is None:
-            return None
+    found, before = constrained(mean, root, inequalities), None
+    while found is not None and found.rise < below:
         more = planes(found.coefficients)
         if not len(more.b):
             return found
+        if before is not None and np.allclose(found.coefficients, before, STANDS, atol=0.0):
+            break  # the planes leave no point, but for rounding
         # Planes that are not active are not needed: the distance grows with every round.
-        found = constrained(mean, covariance, inequalities.and_also(found.active).and_also(more))
+        before, found = found.coefficients, constrained(
+            mean, root, inequalities.and_also(found.active).and_also(more))
     return None
 
 
-def _root(covariance: Array) -> tuple[Array, Array]:
-    """Return standard deviations, and a root L of the correlations: L L^T."""
+def root_of(covariance: Array) -> Array:
+    """Return a root R of a covariance (P, P), R R^T."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     divided = np.where(scale > 0, scale, 1.0)
     values, axes = np.linalg.eigh(covariance / divided[:, None] / divided)
-    return scale, axes * np.sqrt(np.maximum(values, 0.0))
+    root: Array = scale[:, None] * axes * np.sqrt(np.maximum(values, 0.0))
+    return root
+
+
+def _whitened(mean: Array, root: Array, inequalities: Inequalities) -> tuple[Array, Array]:
+    """Return rows A R of length 1, and by how much R^-1 (c - mean) has to move along each."""
+    G = inequalities.A @ root
+    size = np.maximum(np.linalg.norm(G, axis=1), 1e-300)
+    return G / size[:, None], (inequalities.b - inequalities.A @ mean) / size

@@ -28,7 +28,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.base_columns import units_of
-from pprs_dynamics.inference.regression.constrained import Constrained, Inequalities, nearest
+from pprs_dynamics.inference.regression.constrained import (
+    Constrained,
+    Inequalities,
+    nearest,
+    root_of,
+)
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -47,8 +52,14 @@ from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
-from pprs_dynamics.physics.effects.structure_effect import KEPT, MOMENTS, AddedBody, with_bodies
-from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
+from pprs_dynamics.physics.effects.structure_effect import (
+    KEPT,
+    MOMENTS,
+    PRODUCTS,
+    AddedBody,
+    with_bodies,
+)
+from pprs_dynamics.physics.mechanism.description import pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.forces import RIGID_BODY
 
@@ -83,7 +94,7 @@ IN_SOME_STATES: Mapping[tuple[str, str], tuple[str, str, float]] = {
 
 # Of a body's size: how far inside the set of possible bodies a plane is, so that few planes
 # suffice; and what rounding may violate.
-MARGIN, ROUNDING = 1e-4, 1e-9
+MARGIN, ROUNDING = 1e-3, 1e-9
 NEAR = 0.3  # radius of gyration of a small body, of the distance between joints
 THIN = 1e-6  # of a link's largest second moment, which its least is taken to have
 LEAST_MASS = 1e-6  # [kg] of a body
@@ -166,7 +177,7 @@ class Constraints:
             sign = 1.0 if mass >= 0 else -1.0
             doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
             signs.append((sign, -sign) if doubted else (sign,))
-        best: Constrained | None = None
+        best, root = None, root_of(covariance)
         for choice in product(*signs):
             sets = [(places[component], _given(component), self._planes_of(component, sign))
                     for component, sign in zip(bodies, choice, strict=True)]
@@ -180,11 +191,7 @@ class Constraints:
                     A[:, place] = more.A
                     found = found.and_also(Inequalities(A, more.b - more.A @ given))
                 return found
-            found = nearest(mean, covariance, linear, planes)
-            if found is not None and (best is None or found.rise < best.rise):
-                best = found
-            if best is not None and best.rise == 0:
-                break
+            best = nearest(mean, root, linear, planes, best.rise if best else np.inf) or best
         return best
 
     def _planes_of(self, component: Component, sign: float) -> BodyPlanes:
@@ -338,58 +345,55 @@ def body_planes(robot: Mechanism, component: Component, sign: float) -> BodyPlan
     link, centre = next((place.link, np.array(place.centre)) for place in kind.places
                         if kind.prefix_of(place) == prefix)
     reach, usual = reach_of(robot), float(np.abs(robot.inertial[:, 0]).mean())
-    steps = np.repeat([1.0, reach, reach ** 2], [1, 3, 6])
+    gyration = NEAR * reach / REACH
+    order = [name for _, _, name in names]
+    extended = [order.index(name) for name in (*MOMENTS, *PRODUCTS) if name in order]
+    # Second moments tr(I) / 2 - I about the centre of mass per coefficient, (k, 3, 3).
+    unit = np.eye(count)
+    per_unit = np.zeros((count, 3, 3))
+    for k in extended:
+        i, j = ('xyz'.index(axis) for axis in order[k])
+        per_unit[k] = np.eye(3) / 2 if i == j else 0.0
+        per_unit[k, i, j] -= 1.0
+        per_unit[k, j, i] = per_unit[k, i, j]
     row, frame = robot.structure.links[link]
     values, axes = np.linalg.eigh(pseudo_inertia(robot.by_joint[row]))
-    scaled = axes / np.sqrt(np.maximum(values, THIN * values[-1]))
-    order = [name for _, _, name in names]
-    tensor = [order.index(name) if name in order else count
-              for name in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
-    has_extent = any(name in MOMENTS for name in order)
-
-    def inertia(c: Array) -> Array:
-        return np.append(c, 0.0)[tensor].reshape(3, 3)
-
-    def second_moments(c: Array) -> Array:
-        found: Array = sign * (np.trace(inertia(c)) / 2 * np.eye(3) - inertia(c))
-        return found
-
-    def taken(c: Array) -> Array:
-        away = c[1:4] / c[0] if count > 1 else np.zeros(3)
-        body = inertial_in(frame, body_at(c[0], tuple(centre + away), inertia(c)))
-        found: Array = -scaled.T @ pseudo_inertia(body) @ scaled
-        return found
+    placed = np.eye(4)
+    placed[:3, :3], placed[:3, 3] = frame.R, frame.R @ centre + frame.p
+    scaled = placed.T @ axes / np.sqrt(np.maximum(values, THIN * values[-1]))
 
     def violated(c: Array) -> Iterator[tuple[Array, float]]:
-        unit = np.eye(count)
         if not sign * c[0] >= LEAST_MASS / 2:
             yield sign * unit[0], LEAST_MASS
         moment = np.linalg.norm(c[1:4])
         if count > 1 and moment > (1 + ROUNDING) * reach * max(sign * c[0], LEAST_MASS / 2):
             yield ((1 - MARGIN) * reach * sign * unit[0]
                    - np.concatenate(([0.0], c[1:4] / moment, np.zeros(count - 4)))), 0.0
-        if has_extent:
-            extents, directions = np.linalg.eigh(second_moments(c))
-            size = max(float(np.abs(extents).sum()),
-                       max(abs(c[0]), usual) * (NEAR * reach / REACH) ** 2)
+        if extended:
+            extents, directions = np.linalg.eigh(sign * np.tensordot(c, per_unit, 1))
+            size = max(float(np.abs(extents).sum()), max(abs(c[0]), usual) * gyration ** 2)
             for extent, v in zip(extents, directions.T, strict=True):
                 if extent < -ROUNDING * size:
-                    yield np.array([v @ second_moments(axis) @ v for axis in unit]), MARGIN * size
+                    # In proportion to the mass: any point of the plane may be a small body.
+                    yield sign * (per_unit @ v @ v - MARGIN * gyration ** 2 * unit[0]), 0.0
+
+    def taken(c: Array) -> Iterator[tuple[Array, float]]:
+        """Yield planes of directions of the link of which too large a share would be taken."""
+        h = c[1:4] if count > 1 else np.zeros(3)
+        P = np.block([[np.tensordot(c, per_unit, 1) + np.outer(h, h) / c[0], h[:, None]],
+                      [h, c[0]]])
+        shares, directions = np.linalg.eigh(-scaled.T @ P @ scaled)
+        for share, v in zip(shares, directions.T, strict=True):
+            if share > 1 - KEPT + ROUNDING:
+                # The share -(w' S w + (m w_4 + h' w)^2 / m) is homogeneous in (m, h, S).
+                *w, w_4 = scaled @ v
+                mean = w_4 + h @ w / c[0]
+                slope = per_unit @ w @ w + mean * (2 * w_4 - mean) * unit[0]
+                slope[1:4] += 2 * mean * np.array(w[:min(3, count - 1)])
+                yield slope, -(1 - KEPT - MARGIN)
 
     def planes(c: Array) -> Inequalities:
-        found = list(violated(c))
-        if not found and sign < 0:
-            # By how much a direction of the link would be taken away; homogeneous in c.
-            shares, directions = np.linalg.eigh(taken(c))
-            for share, v in zip(shares, directions.T, strict=True):
-                if share > 1 - KEPT + ROUNDING:
-                    slope = np.zeros(count)
-                    for k, size in enumerate(steps[1:count], 1):  # exact: a quadratic form
-                        step = abs(c[0]) * size * np.eye(count)[k]
-                        slope[k] = v @ (taken(c + step) - taken(c - step)) @ v / (
-                            2 * abs(c[0]) * size)
-                    slope[0] = (v @ taken(c) @ v - slope @ c) / c[0]  # Euler's theorem
-                    found.append((-slope, -(1 - KEPT - MARGIN)))
+        found = list(violated(c)) or (list(taken(c)) if sign < 0 else [])
         if not found:
             return Inequalities.none(count)
         return Inequalities(*map(np.array, zip(*found, strict=True)))
