@@ -149,8 +149,16 @@ def test_an_impossible_inertia_moves_no_further_than_it_must(robot: Mechanism) -
     found, rise = nearest_body(robot, component, c, np.diag(SPREAD[:7] ** 2))
     np.testing.assert_allclose(found[4:], [0.01 / 3, 0.04 / 3, 0.05 / 3], atol=2e-5)
     np.testing.assert_allclose(found[:4], c[:4], atol=1e-6)
-    # Planes are 1e-4 of its size inside the set.
+    # Planes are 1e-3 of its size inside the set.
     assert rise == pytest.approx(3 * (0.01 / 3 / 0.02) ** 2, rel=1e-2)
+
+
+def test_moments_that_no_motion_shows_hide_no_impossible_body(robot: Mechanism) -> None:
+    """As of a planar arm: planes differ by 1e-6 of their length, yet the body costs 10^2."""
+    c, std = np.array([2.6, 0.0, 0.0, 0.0, 0.0, -0.2, 0.0]), np.array([*[0.02] * 4, 1e4, 0.02, 1e4])
+    found, rise = nearest_body(robot, payload(robot, 2), c, np.diag(std ** 2))
+    assert least_extents(robot, payload(robot, 2), found)[0] > -1e-9
+    assert rise == pytest.approx((0.2 / 0.02) ** 2, rel=0.02)
 
 
 def test_a_moment_has_a_mass_within_reach(robot: Mechanism) -> None:
