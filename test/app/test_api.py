@@ -24,7 +24,6 @@ from single_axis import axis, axis_recording
 
 import pprs_dynamics
 from pprs_dynamics import (
-    ComparisonResult,
     DriveModel,
     Excitation,
     PprsError,
@@ -55,11 +54,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope='module')
-def compared(folder: Path) -> ComparisonResult:
-    return compare('config/paper.yaml', folder / 'run.csv')
-
-
 def modules_after(code: str) -> set[str]:
     said = subprocess.run([sys.executable, '-c', f'import sys\n{code}\nprint(*sys.modules)'],
                           capture_output=True, text=True, check=True, timeout=120)
@@ -74,9 +68,9 @@ def test_importing_the_package_imports_nothing_heavy(code: str, unwanted: set[st
 
 
 def test_the_command_writes_the_dictionary_and_prints_the_text(
-    compared: ComparisonResult, folder: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    compared = compare('config/paper.yaml', folder / 'run.csv')
     monkeypatch.setenv('COLUMNS', '100')
     assert main(['compare', str(folder / 'run.csv'), '--json', str(folder / 'run.json')]) == 0
     assert checked((folder / 'run.json').read_text(), 'compare') == json.loads(

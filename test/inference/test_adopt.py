@@ -21,7 +21,6 @@ from pprs_dynamics.inference.adoption import adopt as adopting
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption, LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.adoption.request import requested as requesting
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -110,7 +109,7 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
 
 def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
     model = DriveModel.load(files.model)
-    return adopt(model, requesting(text, model), files.recordings[:1], validation,
+    return adopt(model, EffectRequest.of(text, model.drives), files.recordings[:1], validation,
                  diagnosis=files.diagnosis, **options)
 
 

@@ -149,12 +149,3 @@ def test_commands_say_whose_robot_the_model_is() -> None:
                          (changed, '--model MODEL.yaml')):
         assert Inputs.of(given, recording).files.command('diagnose') == (
             f'pprs diagnose RECORDING {words}')
-
-
-def test_the_page_escapes_what_comes_from_files() -> None:
-    html = diagnosis_page(
-        everything(), word_diagnosis(everything()),
-        ['<script>alert(1)</script>'], ['<b>']).html()
-    assert '<script>alert(1)' not in html
-    assert '&lt;script&gt;alert(1)' in html
-    assert 'Held out: &lt;b&gt;' in html

@@ -54,11 +54,6 @@ class Cell:
             PATH.motion(times), conversions.time(start),
             [round((moment - first) * 1e9) for moment in times]))
 
-    def forget(self) -> None:
-        """Begin anew with what was received."""
-        for received in (self.trajectories, self.commands, self.setpoints, self.bench.status):
-            received.clear()
-
     def clock_stands(self) -> bool:
         """Return whether the node has said that ROS time does not advance."""
         return any(status['code'] == 'STALE' and 'ROS time does not advance' in status['message']
@@ -177,7 +172,8 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
         assert cell.bench.spin_until(lambda: not cell.bench.status[-1]['preparing'])
         lasts = PATH.duration + 0.1 - 3.0  # 1.8 s of simulated time
         for _ in range(5):
-            cell.forget()
+            for received in (cell.trajectories, cell.commands, cell.setpoints, cell.bench.status):
+                received.clear()
             start = clock.now
             cell.send(3.0, PATH.duration + 0.1, round(start * 1e9))
             assert cell.bench.spin_until(lambda: cell.setpoints)
