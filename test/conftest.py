@@ -67,7 +67,7 @@ def running() -> Iterator[Any]:
         yield probe
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture(scope='module')
 def browser() -> Iterator[Any]:
     """Chromium."""
     from browser import chromium

@@ -54,13 +54,6 @@ def steps_of(session: Session) -> list[str]:
     return [step.effect for step in read_steps(session.ticks.model.values)]
 
 
-def compared(folder: Path, recording: Path, model: Path) -> dict[str, Any]:
-    assert main(['compare', str(recording), '--model', str(model),
-                 '--json', str(folder / 'compared.json')]) == 0
-    found: dict[str, Any] = json.loads((folder / 'compared.json').read_text())
-    return found
-
-
 def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session) -> None:
     before = session.overall().before
     assert session.overall().now == before
@@ -94,7 +87,9 @@ def test_errors_that_are_shown_are_those_of_compare_after_export(
     assert not session.ticks.view.is_approximate
     assert not session.ticks.view.notice
     session.export(tmp_path / 'ticked.yaml', with_ticked=True)
-    found = compared(tmp_path, recording, tmp_path / 'ticked.yaml')
+    assert main(['compare', str(recording), '--model', str(tmp_path / 'ticked.yaml'),
+                 '--json', str(tmp_path / 'compared.json')]) == 0
+    found = json.loads((tmp_path / 'compared.json').read_text())
     for name, error in session.errors().items():
         assert error.now == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
     assert session.overall().now == pytest.approx(found['overall']['rms'], rel=5e-5)
