@@ -131,6 +131,7 @@ class Design:
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Mapping[int, Array]] = field(
         default_factory=dict, repr=False, compare=False)
+    _exact: tuple[Mapping[str, Any], Array] | None = field(default=None, repr=False, compare=False)
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -206,11 +207,14 @@ class Design:
         """Return the columns that are not computed again around another operating point.
 
         Exact forces are known there, so that columns only say how forces change from there on.
-        Those of numbers, which move within tolerances, and of positions stay (a chord method).
+        All stay from a point with the same effects in nearly the same shapes; those of numbers,
+        which move within tolerances, and of positions from any (a chord method).
         Effects in drives add no load: they change no other column, but for errors of positions,
         with which friction turns over at other times. A sensor of efforts shows all but the columns
         of positions otherwise.
         """
+        if self.point is not None and self.point.is_near(point):
+            return dict(self.columns)
         effects = {e.effect for at in (point, self.point) if at is not None for e in at.effects}
         turning = any(effect.shifts_positions() for effect in effects)
         kept = {HOMING, INERTIA}
@@ -263,8 +267,10 @@ class Design:
         PprsError
             Where the model cannot follow them.
         """
-        return np.concatenate([treated_forces(model, table)['total']
-                               for table in self.reconstructed(model)])
+        if self._exact is None or self._exact[0] != model.values:
+            self._exact = model.values, np.concatenate([
+                treated_forces(model, table)['total'] for table in self.reconstructed(model)])
+        return self._exact[1]
 
     def carried_forces(self, coefficients: Array) -> Array:
         """Return the force of a reference's directions with coefficients, (M, D) [N].

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -143,3 +143,15 @@ class OperatingPoint:
     model: DriveModel
     base: Array
     effects: tuple[PlacedEffect, ...] = ()
+
+    def has(self, effects: Iterable[PlacedEffect], scales: float = 1.0) -> bool:
+        """Return whether it has some effects, their shapes the same to so many scales."""
+        known = {(effect.effect, effect.drive): effect for effect in self.effects}
+        return all((effect.effect, effect.drive) in known and all(
+            abs(effect.shape[p.name] - known[effect.effect, effect.drive].shape[p.name])
+            <= scales * p.scale for p in effect.effect.parameters if p.name in effect.shape)
+            for effect in effects)
+
+    def is_near(self, other: OperatingPoint) -> bool:
+        """Return whether another point has the same effects in nearly the same shapes."""
+        return len(self.effects) == len(other.effects) and self.has(other.effects)

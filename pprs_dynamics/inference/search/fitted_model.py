@@ -219,11 +219,8 @@ def has_nonlinear(fits: FittedSets, fitted: CandidateSet) -> bool:
 def _has_nonlinear(point: OperatingPoint | None, effects: Sequence[PlacedEffect],
                    scales: float = 1.0) -> bool:
     """Return whether a point has the nonlinear ones of some effects, nearly of the same shapes."""
-    known = {(effect.effect, effect.drive): effect for effect in point.effects} if point else {}
-    return all((effect.effect, effect.drive) in known and all(
-        abs(effect.shape[p.name] - known[effect.effect, effect.drive].shape[p.name])
-        <= scales * p.scale for p in effect.effect.parameters if p.name in effect.shape)
-        for effect in effects if effect.effect.nonlinear)
+    nonlinear = [effect for effect in effects if effect.effect.nonlinear]
+    return not nonlinear or (point is not None and point.has(nonlinear, scales))
 
 
 def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
