@@ -15,7 +15,6 @@ from pprs_dynamics.inference.regression.constrained import (
     conditioned,
     constrained,
     nearest,
-    root_of,
 )
 from pprs_dynamics.inference.search.body_centres import REACH
 from pprs_dynamics.inference.search.candidates import Component
@@ -40,7 +39,7 @@ def test_a_constrained_mode_satisfies_the_conditions_of_karush_kuhn_and_tucker(s
     mean, covariance = random.normal(size=size), covariance_of(random, size)
     A = random.normal(size=(count, size))
     b = A @ random.normal(size=size) - random.uniform(0, 1, count)  # a point satisfies them
-    found = constrained(mean, root_of(covariance), Inequalities(A, b))
+    found = constrained(mean, covariance, Inequalities(A, b))
     assert found is not None
     c = found.coefficients
     size_of_rows = np.sqrt(np.einsum('ij,jk,ik->i', A, covariance, A))
@@ -77,7 +76,7 @@ def test_a_convex_set_is_reached_by_its_tangent_planes() -> None:
 def test_a_conditioned_gaussian_is_that_of_the_textbook() -> None:
     random = np.random.default_rng(3)
     mean, covariance = random.normal(size=4), covariance_of(random, 4)
-    found = conditioned(mean, root_of(covariance),
+    found = conditioned(mean, covariance,
                         Inequalities(np.eye(4)[:2], np.array([1.0, -1.0])))
     gain = covariance[2:, :2] @ np.linalg.inv(covariance[:2, :2])
     np.testing.assert_allclose(found.coefficients[2:], mean[2:] + gain @ ([1.0, -1.0] - mean[:2]),
@@ -104,7 +103,7 @@ def nearest_body(robot: Mechanism, component: Component, c: Array, covariance: A
     """Return the nearest body that can be, of either sign where that is in doubt, and its rise."""
     sign = 1.0 if c[0] >= 0 else -1.0
     doubted = abs(c[0]) < DOUBTED * covariance[0, 0] ** 0.5
-    found = [nearest(c, root_of(covariance), Inequalities.none(len(c)),
+    found = [nearest(c, covariance, Inequalities.none(len(c)),
                      body_planes(robot, component, side))
              for side in ((sign, -sign) if doubted else (sign,))]
     best = min((n for n in found if n is not None), key=lambda n: n.rise)

@@ -25,8 +25,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 
+MOST_ROUNDS = 1000  # of planes for a convex set
 DEPENDENT = 1e-12  # singular value of rows of length 1, below which some depend on others
-STANDS = 1e-6  # relative change of coefficients, below which violated planes do not move them
+# Of the terms of an inequality, and of its standard deviation, by which a solution may violate it.
+UNSATISFIED, ROUNDING = 1e-6, 1e-10
 INFEASIBLE = 1e-9  # of the norm of the least-distance problem, below which no point exists
 
 
@@ -84,16 +86,44 @@ class Constrained:
         return found
 
 
-def conditioned(mean: Array, root: Array, active: Inequalities) -> Constrained:
-    """Return a Gaussian given A c = b; rows of A that depend on others count once.
+def conditioned(mean: Array, covariance: Array, active: Inequalities) -> Constrained:
+    """Return a Gaussian given A c = b; rows of A that depend on others count once."""
+    return _conditioned(mean, _root(covariance), active)
+
+
+def constrained(mean: Array, covariance: Array, inequalities: Inequalities) -> Constrained | None:
+    """Return the mode of a Gaussian where A c >= b; None where no point satisfies that."""
+    return _constrained(mean, _root(covariance), inequalities)
+
+
+def nearest(mean: Array, covariance: Array, inequalities: Inequalities,
+            planes: Callable[[Array], Inequalities], below: float = np.inf) -> Constrained | None:
+    """Return the mode of a Gaussian within inequalities and a convex set; None for an empty set.
 
     Parameters
     ----------
     mean : (P,) array
-    root : (P, P) array
-        Of the covariance, see `root_of`.
-    active : Inequalities
+    covariance : (P, P) array
+    inequalities : Inequalities
+    planes : callable
+        Returns, for coefficients, inequalities of the set that they violate; none within it.
+    below : float
+        A rise from which on None is returned.
     """
+    root = _root(covariance)
+    found = _constrained(mean, root, inequalities)
+    for _ in range(MOST_ROUNDS):
+        if found is None or found.rise >= below:
+            return None
+        more = planes(found.coefficients)
+        if not len(more.b):
+            return found
+        # Planes that are not active are not needed: the distance grows with every round.
+        found = _constrained(mean, root, inequalities.and_also(found.active).and_also(more))
+    return None
+
+
+def _conditioned(mean: Array, root: Array, active: Inequalities) -> Constrained:
     G, wanted = _whitened(mean, root, active)
     # Of the rows and not of their products: bodies have moments that no motion shows, a million
     # times as uncertain as others, and their planes differ by the others alone.
@@ -104,19 +134,10 @@ def conditioned(mean: Array, root: Array, active: Inequalities) -> Constrained:
     return Constrained(mean + root @ moved, float(moved @ moved), active, root, fixed)
 
 
-def constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constrained | None:
-    """Return the mode of a Gaussian where A c >= b; None where no point satisfies that.
-
-    Parameters
-    ----------
-    mean : (P,) array
-    root : (P, P) array
-        Of the covariance, see `root_of`.
-    inequalities : Inequalities
-    """
+def _constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constrained | None:
     A, b = inequalities.A, inequalities.b
     if np.all(A @ mean >= b):
-        return conditioned(mean, root, Inequalities.none(len(mean)))
+        return _conditioned(mean, root, Inequalities.none(len(mean)))
     from scipy.optimize import nnls  # here: commands that fit nothing start without it
 
     G, wanted = _whitened(mean, root, inequalities)
@@ -128,38 +149,14 @@ def constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constra
         return None
     # The active constraints hold to rounding as equalities; NNLS has them to its tolerance.
     active = weights > 0
-    return conditioned(mean, root, Inequalities(A[active], b[active]))
+    found = _conditioned(mean, root, Inequalities(A[active], b[active]))
+    # Where rows contradict each other nearly, no point is found that satisfies them.
+    terms = np.abs(A) @ np.abs(found.coefficients) + np.abs(b)
+    rounding = ROUNDING * np.linalg.norm(A @ root, axis=1)
+    return None if np.any(b - A @ found.coefficients > UNSATISFIED * terms + rounding) else found
 
 
-def nearest(mean: Array, root: Array, inequalities: Inequalities,
-            planes: Callable[[Array], Inequalities], below: float = np.inf) -> Constrained | None:
-    """Return the mode of a Gaussian within inequalities and a convex set; None for an empty set.
-
-    Parameters
-    ----------
-    mean : (P,) array
-    root : (P, P) array
-        Of the covariance, see `root_of`.
-    inequalities : Inequalities
-    planes : callable
-        Returns, for coefficients, inequalities of the set that they violate; none within it.
-    below : float
-        A rise from which on None is returned.
-    """
-    found, before = constrained(mean, root, inequalities), None
-    while found is not None and found.rise < below:
-        more = planes(found.coefficients)
-        if not len(more.b):
-            return found
-        if before is not None and np.allclose(found.coefficients, before, STANDS, atol=0.0):
-            break  # the planes leave no point, but for rounding
-        # Planes that are not active are not needed: the distance grows with every round.
-        before, found = found.coefficients, constrained(
-            mean, root, inequalities.and_also(found.active).and_also(more))
-    return None
-
-
-def root_of(covariance: Array) -> Array:
+def _root(covariance: Array) -> Array:
     """Return a root R of a covariance (P, P), R R^T."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     divided = np.where(scale > 0, scale, 1.0)

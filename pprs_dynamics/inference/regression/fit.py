@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.constrained import Inequalities, constrained, root_of
+from pprs_dynamics.inference.regression.constrained import Inequalities, constrained
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
@@ -124,7 +124,7 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Sequence[flo
     A, b = np.concatenate((np.eye(len(blocks)), -np.eye(len(blocks)))), np.concatenate(
         (bounds[:, 0], -bounds[:, 1]))
     known = np.isfinite(b)
-    within = constrained(found.coefficients, root_of(found.covariance),
+    within = constrained(found.coefficients, found.covariance,
                          Inequalities(A[known], b[known]))
     if within is None:
         raise ResidualsError('prior', 'its lower bounds are above its upper ones', 'leave a value')

@@ -30,7 +30,7 @@ from scipy.linalg import block_diag
 
 from pprs_dynamics.arrays import Array, Integers, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
-from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned, root_of
+from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,
@@ -324,8 +324,7 @@ class Regression:
         """
         A = np.zeros((len(equalities.b), len(fit.coefficients)))
         A[:, index] = equalities.A
-        found = conditioned(fit.coefficients, root_of(fit.covariance),
-                            Inequalities(A, equalities.b))
+        found = conditioned(fit.coefficients, fit.covariance, Inequalities(A, equalities.b))
         coefficients = found.coefficients
         squares = np.empty_like(fit.squares)
         for k, d in enumerate(self.drives):

@@ -28,12 +28,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.base_columns import units_of
-from pprs_dynamics.inference.regression.constrained import (
-    Constrained,
-    Inequalities,
-    nearest,
-    root_of,
-)
+from pprs_dynamics.inference.regression.constrained import Constrained, Inequalities, nearest
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -177,7 +172,7 @@ class Constraints:
             sign = 1.0 if mass >= 0 else -1.0
             doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
             signs.append((sign, -sign) if doubted else (sign,))
-        best, root = None, root_of(covariance)
+        best: Constrained | None = None
         for choice in product(*signs):
             sets = [(places[component], _given(component), self._planes_of(component, sign))
                     for component, sign in zip(bodies, choice, strict=True)]
@@ -191,7 +186,7 @@ class Constraints:
                     A[:, place] = more.A
                     found = found.and_also(Inequalities(A, more.b - more.A @ given))
                 return found
-            best = nearest(mean, root, linear, planes, best.rise if best else np.inf) or best
+            best = nearest(mean, covariance, linear, planes, best.rise if best else np.inf) or best
         return best
 
     def _planes_of(self, component: Component, sign: float) -> BodyPlanes:
