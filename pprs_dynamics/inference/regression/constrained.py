@@ -87,12 +87,27 @@ class Constrained:
 
 
 def conditioned(mean: Array, covariance: Array, active: Inequalities) -> Constrained:
-    """Return a Gaussian given A c = b; rows of A that depend on others count once."""
+    """Return a Gaussian given A c = b; rows of A that depend on others count once.
+
+    Parameters
+    ----------
+    mean : (P,) array
+    covariance : (P, P) array
+    active : Inequalities
+        Taken as equalities.
+    """
     return _conditioned(mean, _root(covariance), active)
 
 
 def constrained(mean: Array, covariance: Array, inequalities: Inequalities) -> Constrained | None:
-    """Return the mode of a Gaussian where A c >= b; None where no point satisfies that."""
+    """Return the mode of a Gaussian where A c >= b; None where no point satisfies that.
+
+    Parameters
+    ----------
+    mean : (P,) array
+    covariance : (P, P) array
+    inequalities : Inequalities
+    """
     return _constrained(mean, _root(covariance), inequalities)
 
 
@@ -124,7 +139,7 @@ def nearest(mean: Array, covariance: Array, inequalities: Inequalities,
 
 
 def _conditioned(mean: Array, root: Array, active: Inequalities) -> Constrained:
-    G, wanted = _whitened(mean, root, active)
+    G, wanted, _ = _whitened(mean, root, active)
     # Of the rows and not of their products: bodies have moments that no motion shows, a million
     # times as uncertain as others, and their planes differ by the others alone.
     U, values, V = np.linalg.svd(G, full_matrices=False)
@@ -140,7 +155,7 @@ def _constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constr
         return _conditioned(mean, root, Inequalities.none(len(mean)))
     from scipy.optimize import nnls  # here: commands that fit nothing start without it
 
-    G, wanted = _whitened(mean, root, inequalities)
+    G, wanted, size = _whitened(mean, root, inequalities)
     # In units of the largest violation, so that the last element of the problem is of order 1.
     problem = np.vstack((G.T, wanted / float(np.max(wanted))))
     target = np.append(np.zeros(len(mean)), 1.0)
@@ -152,8 +167,8 @@ def _constrained(mean: Array, root: Array, inequalities: Inequalities) -> Constr
     found = _conditioned(mean, root, Inequalities(A[active], b[active]))
     # Where rows contradict each other nearly, no point is found that satisfies them.
     terms = np.abs(A) @ np.abs(found.coefficients) + np.abs(b)
-    rounding = ROUNDING * np.linalg.norm(A @ root, axis=1)
-    return None if np.any(b - A @ found.coefficients > UNSATISFIED * terms + rounding) else found
+    short = b - A @ found.coefficients
+    return None if np.any(short > UNSATISFIED * terms + ROUNDING * size) else found
 
 
 def _root(covariance: Array) -> Array:
@@ -165,8 +180,8 @@ def _root(covariance: Array) -> Array:
     return root
 
 
-def _whitened(mean: Array, root: Array, inequalities: Inequalities) -> tuple[Array, Array]:
-    """Return rows A R of length 1, and by how much R^-1 (c - mean) has to move along each."""
+def _whitened(mean: Array, root: Array, inequalities: Inequalities) -> tuple[Array, Array, Array]:
+    """Return rows A R of length 1, how far R^-1 (c - mean) has to move along them, and lengths."""
     G = inequalities.A @ root
     size = np.maximum(np.linalg.norm(G, axis=1), 1e-300)
-    return G / size[:, None], (inequalities.b - inequalities.A @ mean) / size
+    return G / size[:, None], (inequalities.b - inequalities.A @ mean) / size, size

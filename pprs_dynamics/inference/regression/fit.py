@@ -124,8 +124,7 @@ def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Sequence[flo
     A, b = np.concatenate((np.eye(len(blocks)), -np.eye(len(blocks)))), np.concatenate(
         (bounds[:, 0], -bounds[:, 1]))
     known = np.isfinite(b)
-    within = constrained(found.coefficients, found.covariance,
-                         Inequalities(A[known], b[known]))
+    within = constrained(found.coefficients, found.covariance, Inequalities(A[known], b[known]))
     if within is None:
         raise ResidualsError('prior', 'its lower bounds are above its upper ones', 'leave a value')
     if len(within.active.b):

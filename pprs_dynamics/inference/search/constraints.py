@@ -54,7 +54,7 @@ from pprs_dynamics.physics.effects.structure_effect import (
     AddedBody,
     with_bodies,
 )
-from pprs_dynamics.physics.mechanism.description import pseudo_inertia
+from pprs_dynamics.physics.mechanism.description import Frame, pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.forces import RIGID_BODY
 
@@ -93,6 +93,7 @@ MARGIN, ROUNDING = 1e-3, 1e-9
 NEAR = 0.3  # radius of gyration of a small body, of the distance between joints
 THIN = 1e-6  # of a link's largest second moment, which its least is taken to have
 LEAST_MASS = 1e-6  # [kg] of a body
+TENSOR = 'xx', 'xy', 'yy', 'xz', 'yz', 'zz'  # of inertial parameters, from the fifth on
 DOUBTED = 2.0  # standard deviations of a mass within which it may be added or taken away
 
 
@@ -347,14 +348,10 @@ def body_planes(robot: Mechanism, component: Component, sign: float) -> BodyPlan
     unit = np.eye(count)
     per_unit = np.zeros((count, 3, 3))
     for k in extended:
-        i, j = ('xyz'.index(axis) for axis in order[k])
-        per_unit[k] = np.eye(3) / 2 if i == j else 0.0
-        per_unit[k, i, j] -= 1.0
-        per_unit[k, j, i] = per_unit[k, i, j]
+        per_unit[k] = pseudo_inertia(np.eye(10)[4 + TENSOR.index(order[k])])[:3, :3]
     row, frame = robot.structure.links[link]
     values, axes = np.linalg.eigh(pseudo_inertia(robot.by_joint[row]))
-    placed = np.eye(4)
-    placed[:3, :3], placed[:3, 3] = frame.R, frame.R @ centre + frame.p
+    placed = (frame @ Frame(p=centre)).matrix
     scaled = placed.T @ axes / np.sqrt(np.maximum(values, THIN * values[-1]))
 
     def violated(c: Array) -> Iterator[tuple[Array, float]]:

@@ -41,6 +41,13 @@ class Frame:
         """The other frame in this one."""
         return Frame(self.R.T, -self.R.T @ self.p)
 
+    @property
+    def matrix(self) -> Array:
+        """The homogeneous matrix, (4, 4)."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.R, self.p
+        return T
+
     def of_point(self, point: Array) -> Array:
         """Return a point of this frame in the one that it stands in."""
         return self.R @ point + self.p
@@ -205,9 +212,7 @@ def rotation_about(axis: Array, angle: float) -> Array:
 
 def inertial_in(frame: Frame, parameters: Array) -> Array:
     """Return inertial parameters (10,) of a body in the frame that its own frame stands in."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = frame.R, frame.p
-    return from_pseudo_inertia(T @ pseudo_inertia(parameters) @ T.T)
+    return from_pseudo_inertia(frame.matrix @ pseudo_inertia(parameters) @ frame.matrix.T)
 
 
 def pseudo_inertia(parameters: Array) -> Array:
