@@ -238,6 +238,7 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     found = diagnose(MODEL, [recording])
     assert {effect.name for effect in found.effects} == {'time_delay', 'viscous_friction'}
     assert 'slide_3' not in {drive for effect in found.effects for drive in effect.drives}
+    np.testing.assert_array_equal(np.isnan(found.after.error), np.isnan(found.residuals.error))
     # One controller is one delay: it costs one number, and is known as well as all drives tell it.
     delays = next(effect for effect in found.effects if effect.name == 'time_delay').parameters
     (value, std), = {(delay.value, delay.std) for delay in delays.values()}

@@ -359,7 +359,10 @@ class Diagnosis(JsonRecord):
     @property
     def after(self) -> Residuals:
         """Residuals of the model with the effects."""
-        return replace(self.residuals, model=self.residuals.measured - self.remaining)
+        found = self.residuals.measured - self.remaining
+        # Where nothing was measured the model is any number.
+        return replace(self.residuals, model=np.where(
+            np.isfinite(found), found, self.residuals.model))
 
     @cached_property
     def noise_floor(self) -> float:
