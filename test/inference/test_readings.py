@@ -51,18 +51,26 @@ def told(model: DriveModel, time: np.ndarray, q: np.ndarray, effort: np.ndarray)
     return '; '.join(finding.what for finding in found)
 
 
-@pytest.mark.parametrize('static_friction', [0.0, 0.6])
-def test_held_poses_show_the_offset_of_a_sensor(arm: DriveModel, static_friction: float) -> None:
+@pytest.mark.parametrize(('static_friction', 'samples', 'pause', 'noise', 'head'), [
+    (0.0, 30, 3.0, 2e-5, 't,q1,q2,tau1,tau2'), (0.6, 30, 3.0, 2e-5, ''), (0.0, 1, 5.0, 0.0, ''),
+    (0.0, 30, 0.6, 0.0, 't,q1,q2,tau1,tau2'), (0.0, 1, 0.0, 2e-5, 'q1,q2,tau1,tau2')])
+def test_held_poses_show_the_offset_of_a_sensor(
+    static_friction: float, samples: int, pause: float, noise: float, head: str, tmp_path: Path,
+) -> None:
+    """One row for each pose or many, with and without times between them, names and noise."""
     random = np.random.default_rng(3)
-    poses = np.repeat(random.uniform(-1.5, 1.5, (40, 2)), 30, axis=0)
-    time = np.repeat(3.0 * np.arange(40), 30) + np.tile(np.arange(30) / 50, 40)
+    poses = np.repeat(random.uniform(-1.5, 1.5, (40, 2)), samples, axis=0)
+    time = np.repeat(pause * np.arange(40), samples) + np.tile(np.arange(samples) / 50, 40)
     still = np.zeros_like(poses)
     effort = arm_efforts(poses, still, still) + random.normal(0, 0.05, poses.shape) + [0, 1.3]
     # A drive stands anywhere between its limits of static friction.
-    effort += np.repeat(static_friction * random.uniform(-1, 1, (40, 2)), 30, axis=0)
-    held = Recording.from_arrays('poses', time, poses + random.normal(0, 2e-5, poses.shape), None,
-                                 effort, DRIVES)
-    answer = diagnose(arm, held)
+    effort += np.repeat(static_friction * random.uniform(-1, 1, (40, 2)), samples, axis=0)
+    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, poses + random.normal(
+        0, noise, poses.shape), effort])[:, not pause:], delimiter=',', comments='', header=head)
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    first = first_model(tmp_path / 'arm.urdf', [tmp_path / 'run.csv'], tmp_path / 'arm.yaml')
+    assert not first.questions
+    answer = diagnose(first.model, read_recording(tmp_path / 'run.csv', first.model.recorded))
     effect, = answer.effects
     assert effect.name == 'effort_offset'
     assert effect.parameters['elbow.force'].value == pytest.approx(
@@ -121,7 +129,7 @@ def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
 
 @pytest.mark.parametrize(('factor', 'words'), [
     (-10.197, 'in kgf cm'), (11.0, 'in kgf cm, or'), (8.0, 'it looks like currents in amperes'),
-    (1e-3, 'in kN m')])
+    (8.851, 'lbf in (then write effort_scale: 0.112985)'), (1e-3, 'in kN m')])
 def test_a_common_factor_is_a_unit_only_near_its_constant(
     arm: DriveModel, factor: float, words: str,
 ) -> None:
@@ -129,6 +137,12 @@ def test_a_common_factor_is_a_unit_only_near_its_constant(
     found = told(arm, time, q, effort * factor)
     assert words in found
     assert factor != 8.0 or 'kgf' not in found
+
+
+def test_the_motion_given_as_effort_is_called_so(arm: DriveModel) -> None:
+    time, q, v, _ = run(3)
+    for quantity, values in ('position', q), ('velocity', v):
+        assert f'is 1 times the {quantity}, and must be a force' in told(arm, time, q, values)
 
 
 @pytest.mark.parametrize('seed', range(2))

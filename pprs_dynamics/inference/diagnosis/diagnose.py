@@ -50,7 +50,8 @@ def diagnose(
         Where no drive moves, and as `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    if not any(share_in_motion(recording.time, recording.position) for recording in recordings):
+    if not any(recording.are_poses or share_in_motion(recording.time, recording.position)
+               for recording in recordings):
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(recording.name for recording in recordings)}',
                           'move: a robot at rest shows no friction, mass or delay', 'shape')

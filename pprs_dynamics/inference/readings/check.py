@@ -27,6 +27,8 @@ from pprs_dynamics.inference.readings.evidence import (
 )
 from pprs_dynamics.inference.readings.findings import (
     OtherReading,
+    factors_of,
+    find_motion,
     find_no_measurements,
     find_other_velocities,
     find_shares,
@@ -36,7 +38,6 @@ from pprs_dynamics.inference.readings.findings import (
     knows_forces,
     lines_of,
     near,
-    velocity_factors,
 )
 from pprs_dynamics.inference.readings.mounting import MOUNTING, mounting_in
 from pprs_dynamics.inference.readings.table import Reading, readings
@@ -110,6 +111,9 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if found := tuple(find_sign_bit(recording)):
         return found
     search = Search(model, recording, is_first)
+    excerpt = search.excerpt(1.0)
+    if excerpt is not None and (found := tuple(find_motion(model, excerpt))):
+        return found
     by_reading = []
     for fit in search.likely() or [Fit(search.rows[0])]:
         said = findings_of(model, recording, fit.reading)
@@ -129,7 +133,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
             ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
     if not search.has_gain:
         mistakes += find_shares(model)
-    evidence, excerpt = search.evidence(search.rows[0]), search.excerpt(1.0)
+    evidence = search.evidence(search.rows[0])
     if evidence is None or excerpt is None or any(
             isinstance(mistake, OtherReading) for mistake in mistakes):
         return tuple(mistakes)
@@ -160,7 +164,8 @@ class Search:
         columns, excerpt = model.recorded.columns, self.excerpt(1.0)
         self.rate = columns.rate if rate is None and columns is not None else rate
         # Recorded velocities over the derivatives of positions.
-        self.factors = {} if excerpt is None else velocity_factors(excerpt)
+        self.factors = {} if excerpt is None else factors_of(
+            excerpt.velocity, excerpt.motion.velocity)
         turning = [units.turns for units in model.units]
         self.rows = readings(model.drives, model.units, self._loads(), _time_units(recording),
                              bool(np.all(recording.position[:, turning] % 1 == 0)))

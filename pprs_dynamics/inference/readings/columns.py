@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, starmap
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from pprs_dynamics.inference.readings.links import (
     layouts,
     measured,
     move_alike,
+    roughness,
     running_on,
     turn_of,
 )
@@ -43,6 +44,7 @@ from pprs_dynamics.measurement.files.table_files import (
     TIME_LIKE,
     fraction_of_seconds,
 )
+from pprs_dynamics.measurement.motion.rests import FEW, NO_MOTION, held_poses
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Columns = dict[tuple[str, str], Column]
@@ -180,6 +182,10 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     if outside:
         notes.append(f'{by_column[outside[0]].title} is an external torque by its name, from which '
                      'a model was taken out')
+    if time is None and rate is None and len(held_poses(np.column_stack([
+            by_column[columns[joint, main]].values for joint in known]))):
+        rate = 1.0
+        notes.append('poses are held, each for as long as any: rate 1 Hz')
     guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
                   table.EXTERNAL if outside else '', fraction)
     return guess if quantity else _judge_velocities(guess, by_column, time)
@@ -213,7 +219,10 @@ def _time(series: Sequence[Series], has_rate: bool,
         notes.append(f'column {found.column} rises all the time: taken as time')
     scale = scale_of(found.title, table.TIME)
     step = float(np.median(np.diff(found.values[np.isfinite(found.values)])))
-    if scale is None and step > table.SLOWEST:
+    # Poses that are held may be seconds apart.
+    if scale is None and step > table.SLOWEST and any(
+            roughness(item.values[:, None]) < NO_MOTION for item in series
+            if item not in rising and np.any(np.diff(item.values))) and len(found.values) > FEW:
         scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
     return replace(found, values=found.values * (scale or 1.0)), None, scale, notes
@@ -383,9 +392,12 @@ def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: fl
     efforts = values[known][:, layout.blocks[EFFORT]] if EFFORT in layout.blocks else (
         np.full(position.shape, np.nan))
     velocity = values[known][:, layout.blocks[VELOCITY]] if VELOCITY in layout.blocks else None
+    firsts = held_poses(position, time[known], velocity)
+    edges = [*firsts.tolist(), len(position)] if len(firsts) else [0, len(position)]
     search = Search(model, Recording(
         model.drives, time[known], position, velocity, efforts, name='',
-        segments=(slice(0, len(position)),)), is_first=True, rate=rate)
+        segments=tuple(starmap(slice, pairwise(edges))), are_poses=len(firsts) > 0),
+        is_first=True, rate=rate)
     fit = search.best()
     evidence = search.evidence(fit.reading)
     # A column that certainly holds inertia or weight is an effort in some unit.

@@ -148,10 +148,14 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         listed = ', '.join(f'{scale:.3g} ({drive})' for drive, scale in zip(
             drives, scales, strict=True) if scale != 1)
         gains = ', '.join(f'{1 / scale:.3g}' for scale in scales)
+        known = [f'{name.format(model.units[0].effort)} (then write effort_scale: {1 / unit:.6g}), '
+                 for unit, name in (table.TORQUES if all(
+                     units.turns for units in model.units) else table.EFFORTS).items()
+                 if np.all(np.abs(np.log(np.abs(scales) / unit)) < np.log(table.NAMED))]
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
            f'amperes (then write effort_kind: current, and under robot  gain: [{gains}]), '
-           'percent of a torque, or another unit')
+           f'{"".join(known)}percent of a torque, or another unit')
     else:
         for scale in dict.fromkeys(scales[scales != 1].tolist()):
             group = np.flatnonzero(scales == scale).tolist()
@@ -168,7 +172,8 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
 def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterator[OtherReading]:
     """Yield recorded velocities that are a multiple of the derivatives of positions."""
     groups: dict[float, list[int]] = {1.0: []}
-    for drive, (factor, doubt) in ({} if excerpt is None else velocity_factors(excerpt)).items():
+    for drive, (factor, doubt) in ({} if excerpt is None else factors_of(
+            excerpt.velocity, excerpt.motion.velocity)).items():
         doubt_of_one = max(doubt, table.NEAR_ONE)
         unit = near(factor, (1.0,), doubt_of_one) or near(
             factor, (*table.VELOCITY_UNITS, *groups), doubt)
@@ -189,20 +194,36 @@ def near(factor: float, units: Iterable[float], doubt: float = table.RATE_OFF) -
     return next((unit for unit in units if abs(factor / unit - 1) <= doubt), 0.0)
 
 
-def velocity_factors(excerpt: Excerpt) -> dict[int, tuple[float, float]]:
-    """Return recorded velocities over the derivatives of positions, of drives where they agree.
+def factors_of(recorded: Array | None, true: Array, least: float = table.ALIKE,
+               ) -> dict[int, tuple[float, float]]:
+    """Return recorded columns over those of a motion, of drives where they agree.
 
     Each with its relative doubt: noise of the derivatives makes a factor smaller.
     """
     found = {}
-    for drive, (recorded, true) in enumerate(() if excerpt.velocity is None else zip(
-            excerpt.velocity.T, excerpt.motion.velocity.T, strict=True)):
-        pair = np.column_stack([recorded, true])[np.isfinite(recorded)]
+    for drive, columns in enumerate(() if recorded is None else zip(
+            recorded.T, true.T, strict=True)):
+        pair = np.column_stack(columns)[np.isfinite(columns[0])]
         (size, both), (_, other) = pair.T @ pair
         alike = float(both / np.sqrt(max(size * other, 1e-300)))
-        if abs(alike) >= table.ALIKE:
+        if abs(alike) >= least:
             found[drive] = float(both / other), table.RATE_OFF + 1 - alike ** 2
     return found
+
+
+def find_motion(model: DriveModel, excerpt: Excerpt) -> Iterator[OtherReading]:
+    """Yield efforts that are the recorded motion itself."""
+    motion = ('position', 'velocity', 'acceleration')
+    for quantity in motion if model.effort_kind not in KINDS else ():
+        found = factors_of(excerpt.effort, getattr(excerpt.motion, quantity), table.COPY)
+        group = [d for d, (factor, doubt) in found.items() if near(factor, (1.0,), doubt)]
+        if group:
+            yield OtherReading.of(
+                'effort_motion', model.drives, group,
+                f'the effort of {named(model.drives, tuple(group))} is '
+                f'{found[group[0]][0]:.3g} times the {quantity}, and must be a force or torque: '
+                'name its column under columns. Or no effort was measured',
+                f'{EFFORT_KIND}: {recorded_names.COMMANDED}')
 
 
 def _time_scale(model: DriveModel, unit: float) -> Scale:

@@ -34,6 +34,10 @@ TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
+# The same, with those that are only named in a question, within this factor.
+TORQUES = {**EFFORTS, 1e2: 'N cm', 1 / 9.80665: 'kgf m', 1 / 0.1129848: 'lbf in', (
+    1 / 7.0615518e-3): 'ozf in'}
+NAMED = 1.25
 # Factors by which masses are off at most in such a unit: the compliance of a controller, times
 # N/m, is near kN, and drives of 0.08 to 0.12 N m/A are near kgf cm.
 OFF_IN_UNIT = {1e3: 3.0, 1e-3: 1.5, KGF_CM: 1.2}

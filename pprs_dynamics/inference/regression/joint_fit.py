@@ -48,7 +48,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsErro
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
-LEAST_POSES = 20  # that are held: their errors are independent
+LEAST_POSES = 10  # that are held: their errors are independent
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
@@ -124,8 +124,10 @@ class Regression:
         self.drives = tuple(self.series)
         if not self.drives:
             most = max(map(len, every.values()), default=0)
-            raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
-                                 f'contain at least {least} of a drive')
+            what, rule = ('held poses', ', twice that for a fit') if least == LEAST_POSES else (
+                'samples after treatment', '')
+            raise ResidualsError('measured', f'a drive has at most {most} {what}',
+                                 f'contain at least {least} of a drive{rule}')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}

@@ -66,7 +66,8 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
                or part.stop - part.start < LONGEST]
     if not windows:
         return None
-    chosen = sorted({round(place) for place in np.linspace(0, len(windows) - 1, stretches)})
+    count = MOST_BLOCKS if recording.are_poses else stretches
+    chosen = sorted({round(place) for place in np.linspace(0, len(windows) - 1, count)})
     scaled = replace(
         recording, time=recording.time * time_unit, segments=tuple(windows[k] for k in chosen))
     try:

@@ -66,8 +66,8 @@ def _used(recording: Recording) -> int:
 
 def _blocks(recording: Recording, times: int) -> float:
     """Return how many blocks of so many usual ones a recording has."""
-    if not recording.segments:
-        return 0.0
+    if recording.are_poses or not recording.segments:
+        return float(len(recording.segments))
     return _used(recording) / (times * block_length(_step(recording)))
 
 

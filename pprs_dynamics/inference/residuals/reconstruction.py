@@ -27,7 +27,7 @@ from pprs_dynamics.measurement.motion.drive_motion import (
     smoothed_again,
     smoothed_as,
 )
-from pprs_dynamics.measurement.motion.rests import are_held_poses, find_rests, rest_speeds
+from pprs_dynamics.measurement.motion.rests import find_rests, rest_speeds
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
@@ -302,7 +302,7 @@ def _efforts(model: DriveModel, recording: Recording) -> Array:
     Where poses are held throughout, their efforts count: they show gravity and offsets.
     """
     effort = recording.effort
-    if model.rest_speed and not are_held_poses(recording.position, recording.segments):
+    if model.rest_speed and not recording.are_poses:
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))

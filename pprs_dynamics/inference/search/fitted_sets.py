@@ -37,6 +37,7 @@ SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 SHAPE_DIGITS = 4  # of a shape: at the optimum a cost changes by less than the least improvement
 NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
+ROUNDING = 1e-12  # of correlations
 
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
 
@@ -239,9 +240,12 @@ class FittedSets:
             return np.inf
         fit = self.free(fitted)  # constraints say nothing of the density at 0
         place = fit.places[block]
-        c, covariance = fit.coefficients[place], fit.covariance[place, place]
-        return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
-                     + np.linalg.slogdet(block.precision)[1])
+        # Moments of a body that a motion does not show are far less certain than its mass.
+        size = np.sqrt(np.diag(fit.covariance)[place])
+        c = fit.coefficients[place] / size
+        alike = fit.covariance[place, place] / np.outer(size, size) + ROUNDING * np.eye(len(size))
+        return float(c @ np.linalg.solve(alike, c) + np.linalg.slogdet(alike)[1]
+                     + 2 * np.log(size).sum() + np.linalg.slogdet(block.precision)[1])
 
     def free(self, fitted: CandidateSet) -> JointFit:
         """Return the fit of a set without constraints, at its noise."""

@@ -22,6 +22,7 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     when,
 )
+from pprs_dynamics.measurement.motion.rests import held_poses
 from pprs_dynamics.system.plain_text import counted
 
 # What a differentiating filter needs at least; shorter segments are nothing but edges.
@@ -54,6 +55,8 @@ class Judgement:
         The remaining samples.
     segments : tuple of slice
         Stretches without reset, jump or gap, of at least 20 samples.
+    are_poses : bool
+        Whether each stretch is a pose that is held, of any length.
     findings : list of Defect
     """
 
@@ -61,14 +64,22 @@ class Judgement:
         self.samples = samples
         self.findings = list(samples.findings)
         self.segments: tuple[slice, ...] = ()
+        self.are_poses = False
         self._stretch: Indices = np.zeros(len(samples.time), dtype=np.int64)  # numbers of them
         self._drop_non_finite()
         if not len(self.samples.time):
             return
         self._order()
-        self._keep(self._first_of_held('position', self.samples.position))
-        self._judge_positions()
-        self._judge_spacing()
+        poses = held_poses(*(getattr(self.samples, name) for name in (
+            'position', 'time', 'velocity')))
+        self.are_poses = len(poses) > 0
+        if self.are_poses:
+            self._split(poses[1:])
+            self._tell('held_poses', len(poses), f'{len(poses)} poses are held, and no motion')
+        else:
+            self._keep(self._first_of_held('position', self.samples.position))
+            self._judge_positions()
+            self._judge_spacing()
         self._judge_efforts_and_velocities()
         self._judge_constant_values()
         self._cut_segments()
@@ -303,6 +314,9 @@ class Judgement:
     def _cut_segments(self) -> None:
         time = self.samples.time
         parts = stamps.stretches(self._stretch)
+        if self.are_poses:
+            self.segments = tuple(parts)
+            return
         short = [part for part in parts if part.stop - part.start < SHORTEST_SEGMENT]
         self.segments = tuple(
             part for part in parts if part.stop - part.start >= SHORTEST_SEGMENT)

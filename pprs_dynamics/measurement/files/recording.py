@@ -49,6 +49,8 @@ class Recording(Samples):
     gain : (D,) array or None
         By which recorded currents were multiplied [N m/A, N/A]; NaN for drives whose efforts were
         recorded, None where all were.
+    are_poses : bool
+        Whether each segment is a pose that is held.
     drives, time, position, velocity, effort, epoch, source, findings, units
     effort_limits, channels
         As of `Samples`.
@@ -62,6 +64,7 @@ class Recording(Samples):
     name: str
     segments: tuple[slice, ...] = ()
     gain: Array | None = None
+    are_poses: bool = False
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1:
@@ -326,11 +329,12 @@ def write_recording(path: str | PathLike[str], recording: Recording) -> None:
 def describe(recording: Recording) -> Summary:
     """Return a summary of a recording: rates, duration, ranges, findings."""
     time = recording.time
-    steps = [np.diff(time[part]) for part in recording.segments]
+    parts = (slice(0, len(time)),) if recording.are_poses else recording.segments
+    steps = [np.diff(time[part]) for part in parts]
     segments = tuple(
         SegmentSummary(float(time[part.start]), float(time[part.stop - 1]), len(own) + 1,
                        float(1 / np.median(own)))
-        for part, own in zip(recording.segments, steps, strict=True))
+        for part, own in zip(parts, steps, strict=True))
     ranges = {}
     for k, drive in enumerate(recording.drives):
         position, effort = _range(recording.position[:, k]), recording.effort[:, k]
@@ -360,7 +364,7 @@ def _numbers(quantity: str, values: ArrayLike) -> Array:
 def _judged(name: str, samples: Samples) -> Recording:
     judged = Judgement(samples)
     return Recording(**{**vars(judged.samples), 'findings': tuple(judged.findings)}, name=name,
-                     segments=judged.segments)
+                     segments=judged.segments, are_poses=judged.are_poses)
 
 
 def _range(values: Array) -> tuple[float, float] | None:

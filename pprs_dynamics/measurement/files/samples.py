@@ -61,6 +61,7 @@ POLICY = {
     'impossible_velocity': 'they count as not measured',
     'impossible_effort': 'they count as not measured',
     'held_position': 'each is used once',
+    'held_poses': 'each counts by the mean of its effort; they show gravity and offsets',
     'held_effort': 'each is used once',
     'unmeasured_effort': 'it counts as not measured',
     'effort_zero': 'they count as not measured',

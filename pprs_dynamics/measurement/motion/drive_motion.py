@@ -22,7 +22,6 @@ from pprs_dynamics.measurement.motion.differentiation import (
     choose_smoothing,
     representative,
 )
-from pprs_dynamics.measurement.motion.rests import are_held_poses
 from pprs_dynamics.measurement.motion.sampling_grid import SamplingGrid, find_grid
 from pprs_dynamics.measurement.motion.treatment import (
     block_duration,
@@ -94,7 +93,7 @@ def smooth_drives(recording: Recording, blocks_per_period: float = 0.0, unit: st
     MotionError
         Where no segment is long enough.
     """
-    if are_held_poses(recording.position, recording.segments):
+    if recording.are_poses:
         return _held_poses(recording)
     segments = [part for part in recording.segments
                 if part.stop - part.start > 2 * SHORTEST_WINDOW]
@@ -158,8 +157,7 @@ def _held_poses(recording: Recording) -> DriveMotion:
         firsts, int(lengths.max()),
         Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
         (SamplingGrid(step, np.arange(len(index), dtype=float)),),
-        np.zeros((2, position.shape[1]), dtype=bool),
-        (f'{len(parts)} poses are held: each counts by the mean of its effort',))
+        np.zeros((2, position.shape[1]), dtype=bool), ())
 
 
 def smoothed_again(motion: DriveMotion, recording: Recording,
