@@ -12,8 +12,8 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.findings import NoMeasurement, OtherReading, looks_like
-from pprs_dynamics.inference.readings.mounting import other_mounting
+from pprs_dynamics.inference.readings.check import other_mounting
+from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, looks_like
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
@@ -82,7 +82,7 @@ def _other_reading(recordings: Sequence[Recording]) -> str:
 @outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '
               'diagnosis before the search: `unknown`')
 def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
-          reference: Reference | None) -> tuple[dict[str, NoMeasurement], dict[str, StickSlip]]:
+          reference: Reference | None) -> tuple[dict[str, Mistake], dict[str, StickSlip]]:
     """Return the drives whose efforts are no measurement, and those that stick and slip."""
     other = other_mounting(model, recordings) or looks_like(model, recordings)
     if other and reference is not None:

@@ -15,7 +15,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.findings import NoMeasurement, effort_looks_like
+from pprs_dynamics.inference.readings.findings import Mistake
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -301,7 +301,7 @@ class Diagnosis(JsonRecord):
         residual of the best set.
     held_out_on : {'blocks', 'validation'}
         Held-out data: blocks of the recordings, or those of --validate.
-    effort_looks_like : mapping of str to NoMeasurement
+    effort_looks_like : mapping of str to Mistake
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
         Drives that stick and slip for much of the time: then no effect is reported.
@@ -342,7 +342,7 @@ class Diagnosis(JsonRecord):
     little: Mapping[str, float] = field(default_factory=dict)
     unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
-    effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
+    effort_looks_like: Mapping[str, Mistake] = field(default_factory=dict)
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
     other_reading: str = ''
     since: SinceReference | None = None
@@ -382,7 +382,7 @@ class Diagnosis(JsonRecord):
     @property
     def kinds_of_effort(self) -> dict[str, str] | None:
         """Kind of each drive's effort that is no measurement; null for none."""
-        return effort_looks_like([self.effort_looks_like.values()])
+        return {drive: looks.kind for drive, looks in self.effort_looks_like.items()} or None
 
     @property
     def explained(self) -> dict[str, float]:

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pprs_dynamics.inference.diagnosis.quantities import listed
-from pprs_dynamics.inference.readings.mounting import MOUNTING
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-    from pprs_dynamics.inference.readings.findings import NoMeasurement
+    from pprs_dynamics.inference.readings.findings import Mistake
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
@@ -98,10 +97,10 @@ def _has_no_friction(model: DriveModel) -> bool:
         np.any(model.values[key]) for key in OWN_FRICTION)
 
 
-def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
+def measure_first(findings: Sequence[Mistake], files: GivenFiles) -> tuple[str, str]:
     """Return the next step where efforts are no measurement, and the command that ignores this."""
     lines = list(dict.fromkeys(finding.line for finding in findings if finding.line))
-    if all(finding.kind == MOUNTING for finding in findings):
+    if all(finding.kind == 'mounting' for finding in findings):
         return (f'Write {listed(lines)} into the model file. If the robot is mounted as in the '
                 'model, continue with', files.command('diagnose', '--as-it-is'))
     say = f', or write {listed(lines, "or")} into the model file' if lines else ''

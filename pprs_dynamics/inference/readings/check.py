@@ -23,9 +23,11 @@ from pprs_dynamics.inference.readings.evidence import (
     Likelihood,
     effort_contents,
     in_reading,
+    mounting_in,
     read_motion,
 )
 from pprs_dynamics.inference.readings.findings import (
+    Mistake,
     OtherReading,
     factors_of,
     find_motion,
@@ -39,12 +41,10 @@ from pprs_dynamics.inference.readings.findings import (
     lines_of,
     near,
 )
-from pprs_dynamics.inference.readings.mounting import MOUNTING, mounting_in
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -97,7 +97,7 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
 
 
 def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = False,
-                  ) -> tuple[Defect, ...]:
+                  ) -> tuple[Mistake, ...]:
     """Return the mistakes of a recording's names, units and signs, as findings.
 
     Parameters
@@ -118,10 +118,10 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     for fit in search.likely() or [Fit(search.rows[0])]:
         said = findings_of(model, recording, fit.reading)
         if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
-            said += find_other_velocities(model, search.excerpt(fit.reading.time_unit))
+            said += find_other_velocities(model, search.factors, fit.reading.time_unit)
         by_reading.append(said)
     # What all of them say is no question.
-    mistakes: list[Defect] = [mistake for mistake in by_reading[0] if all(
+    mistakes: list[Mistake] = [mistake for mistake in by_reading[0] if all(
         mistake in said for said in by_reading)]
     by_reading = [[mistake for mistake in said if mistake not in mistakes] for said in by_reading]
     if kinds := {mistake.kind for said in by_reading for mistake in said}:
@@ -142,6 +142,16 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
         mistakes += find_no_measurements(
             model, effort_contents(model, recording, evidence), search.has_gain)
     return tuple(mistakes)
+
+
+def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
+    """Return the finding that gravity has another direction than in the model, by drive."""
+    for recording in recordings:
+        search = Search(model, recording, False)
+        for row in search.mounting(search.rows[0]):
+            return dict.fromkeys(model.drives, findings_of(model, recording, row.after(
+                search.rows[0]))[0])
+    return {}
 
 
 class Search:
@@ -246,7 +256,7 @@ class Search:
         seed = None
         while self._top() is not seed:
             seed = self._top()
-            self.fits += [fit for row in (*self.rows[1:], *self._mounting(seed.reading),
+            self.fits += [fit for row in (*self.rows[1:], *self.mounting(seed.reading),
                                           *self._rates(seed.reading))
                           if row.kind in tried and self._may_follow(row, seed.reading)
                           for reading in self._after(row, seed.reading)
@@ -273,10 +283,10 @@ class Search:
         rivals = self._rivals(best)
         return [best, *rivals] if not best.reading.is_plain or (self.is_first and rivals) else []
 
-    def _mounting(self, before: Reading) -> list[Reading]:
+    def mounting(self, before: Reading) -> list[Reading]:
         """Return the row with the gravity that explains what another reading does not."""
         excerpt = self.excerpt(before.time_unit)
-        row = None if excerpt is None or MOUNTING in before.kinds or not self.has_gain else (
+        row = None if excerpt is None or 'mounting' in before.kinds or not self.has_gain else (
             mounting_in(self.model, excerpt, before))
         return [] if row is None else [row]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import Reading
@@ -268,6 +268,67 @@ def forces_of(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
             if not len(rigid) > 1:
                 others = forces.total - rigid[0]
     return np.stack([rigid[0] - rigid[1], rigid[1], others])
+
+
+def mounting_in(model: DriveModel, excerpt: Excerpt, reading: Reading) -> Reading | None:
+    """Return the row of the table with the gravity that explains the efforts of a reading.
+
+    Efforts, in any unit, are fitted with a free gravity vector, and each drive's inertia, friction
+    and offset. None where the direction is the model's, or explains the efforts of some drive not
+    much better.
+    """
+    given = np.asarray(model.values[gravity_key(model)], dtype=float)
+    size = float(np.linalg.norm(given))
+    if size == 0:
+        return None
+    motion = read_motion(excerpt.motion, reading)
+    try:
+        (_, nothing, _), *weights = (forces_of(in_reading(model, replace(
+            reading, gravity=gravity)), motion, excerpt.time)
+            for gravity in (np.zeros(3), *size * np.eye(3)))
+    except (PprsError, np.linalg.LinAlgError):  # what the mechanism cannot follow
+        return None
+    columns = np.stack([weight - nothing for _, weight, _ in weights], axis=2)
+    v, a, inertia = motion.velocity, motion.acceleration, weights[0][0]
+    own = np.stack((v, np.sign(v), a, np.ones_like(v), inertia), axis=2)
+    rows, targets = [], []
+    for d, effort in enumerate(excerpt.effort[:, reading.efforts].T):
+        at = np.isfinite(effort)
+        y = np.column_stack((effort[at], columns[at, d]))
+        # What the drive's inertia, friction and offset do not explain.
+        rest = y - own[at, d] @ np.linalg.lstsq(own[at, d], y, rcond=None)[0]
+        if np.any(rest[:, 0]) and np.any(rest[:, 1:]):
+            rest /= root_mean_square(rest[:, 0])
+            rows.append(rest[:, 1:])
+            targets.append(rest[:, 0])
+    if not rows:
+        return None
+    G, target = np.concatenate(rows), np.concatenate(targets)
+    share = np.linalg.lstsq(G, target, rcond=1e-3)[0]
+    along = G @ given
+    same = given * max(float(along @ target), 0.0) / max(float(along @ along), 1e-300)
+    is_explained = all(
+        np.sum((target - G @ share) ** 2) < table.MOST_LEFT * np.sum((target - G @ same) ** 2)
+        for G, target in zip(rows, targets, strict=True))
+    norm = float(np.linalg.norm(share))
+    if not is_explained or _angle(share, given) < table.LEAST_TILT:
+        return None
+    largest = np.argmax(np.abs(share))
+    axis = np.sign(share[largest]) * np.eye(3)[largest]
+    gravity = size * axis if _angle(share, axis) < table.ALONG else (size / norm * share).round(1)
+    found, known = (', '.join(f'{value + 0.0:g}' for value in vector)
+                    for vector in (gravity, given))
+    return replace(
+        Reading.plain(len(model.drives)), kind='mounting', gravity=gravity,
+        drives=tuple(range(len(model.drives))), cost=table.COST['mounting'],
+        what=f'gravity in the base is ({found}) m/s² in this recording and ({known}) m/s² in the '
+        'model: the robot is mounted in another direction')
+
+
+def _angle(a: Array, b: Array) -> float:
+    """Return the angle between two vectors, (3,) [rad]."""
+    sizes = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+    return float(np.arccos(np.clip(a @ b / sizes, -1.0, 1.0)))
 
 
 @dataclass(frozen=True)

@@ -169,11 +169,12 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
     return found
 
 
-def find_other_velocities(model: DriveModel, excerpt: Excerpt | None) -> Iterator[OtherReading]:
+def find_other_velocities(model: DriveModel, factors: Mapping[int, tuple[float, float]],
+                          time_unit: float) -> Iterator[OtherReading]:
     """Yield recorded velocities that are a multiple of the derivatives of positions."""
     groups: dict[float, list[int]] = {1.0: []}
-    for drive, (factor, doubt) in ({} if excerpt is None else factors_of(
-            excerpt.velocity, excerpt.motion.velocity)).items():
+    for drive, (once, doubt) in factors.items():
+        factor = once * time_unit
         doubt_of_one = max(doubt, table.NEAR_ONE)
         unit = near(factor, (1.0,), doubt_of_one) or near(
             factor, (*table.VELOCITY_UNITS, *groups), doubt)
@@ -368,9 +369,9 @@ def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares], has_
                  for kind in dict.fromkeys(kinds.values()) if kind)
 
 
-def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
+def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
     """Return the finding for each drive whose effort is no measurement in one of the recordings."""
-    found: dict[str, NoMeasurement] = {}
+    found: dict[str, Mistake] = {}
     for recording in recordings:
         for finding in find_no_measurements(
                 model, effort_contents(model, recording), knows_forces(model)):

@@ -21,6 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 
 # ------------------------------------------------------------------------------------- units
 
@@ -89,6 +90,9 @@ CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
 RESTING = 0.01  # [rad/s, m/s] speed from which a drive moves, however wide friction turns over
 WEAK = 0.01  # swings that are this much smaller than others are no evidence
+ALONG = 0.1  # [rad] from an axis of the base, up to which gravity is along it
+LEAST_TILT = BaseTilt.linear[0].upper  # [rad]; a smaller one is the effect base_tilt
+MOST_LEFT = 0.25  # of the squared error of each drive with the model's direction of gravity
 LEAST_FORCE = 1e-3  # the same, of efforts: weak drives may be negated, too
 
 # ------------------------------------------------------------------------- scales of efforts
