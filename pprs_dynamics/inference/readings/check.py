@@ -45,6 +45,7 @@ from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -110,10 +111,12 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     """
     if found := tuple(find_sign_bit(recording)):
         return found
-    search = Search(model, recording, is_first)
-    excerpt = search.excerpt(1.0)
-    if excerpt is not None and (found := tuple(find_motion(model, excerpt))):
+    excerpt = excerpt_of(recording, table.STRETCHES)
+    if excerpt is None:
+        return tuple(find_shares(model))
+    if found := tuple(find_motion(model, excerpt)):
         return found
+    search = Search(model, recording, excerpt, is_first)
     by_reading = []
     for fit in search.likely() or [Fit(search.rows[0])]:
         said = findings_of(model, recording, fit.reading)
@@ -131,11 +134,9 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
             kind, model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in said) or PLAIN for said in by_reading),
             ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
-    if not search.has_gain:
-        mistakes += find_shares(model)
+    mistakes += find_shares(model)
     evidence = search.evidence(search.rows[0])
-    if evidence is None or excerpt is None or any(
-            isinstance(mistake, OtherReading) for mistake in mistakes):
+    if evidence is None or any(isinstance(mistake, OtherReading) for mistake in mistakes):
         return tuple(mistakes)
     mistakes += find_unsigned(model, recording, excerpt, evidence)
     if not mistakes:
@@ -147,10 +148,9 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
 def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
     """Return the finding that gravity has another direction than in the model, by drive."""
     for recording in recordings:
-        search = Search(model, recording, False)
-        for row in search.mounting(search.rows[0]):
-            return dict.fromkeys(model.drives, findings_of(model, recording, row.after(
-                search.rows[0]))[0])
+        excerpt, plain = excerpt_of(recording, table.STRETCHES), Reading.plain(len(model.drives))
+        if excerpt is not None and (row := mounting_in(model, excerpt, plain)) is not None:
+            return dict.fromkeys(model.drives, findings_of(model, recording, row.after(plain))[0])
     return {}
 
 
@@ -161,23 +161,26 @@ class Search:
     ----------
     model : DriveModel
     recording : Recording
+    excerpt : Excerpt
+        Of the recording.
     is_first : bool
         Whether nobody has checked the unit of the efforts yet.
     rate : float, optional
         Samples per second where no times are recorded; without, that of the model file.
     """
 
-    def __init__(self, model: DriveModel, recording: Recording, is_first: bool,
+    def __init__(self, model: DriveModel, recording: Recording, excerpt: Excerpt, is_first: bool,
                  rate: float | None = None) -> None:
-        self.model, self.recording = model, recording
-        self._excerpts: dict[float, Excerpt | None] = {}
-        columns, excerpt = model.recorded.columns, self.excerpt(1.0)
+        self.model = model
+        # Gaps are other ones in milliseconds.
+        self._excerpts = {1.0: excerpt, **{unit: other for unit in _time_units(recording) if (
+            other := excerpt_of(recording, table.STRETCHES, unit)) is not None}}
+        columns = model.recorded.columns
         self.rate = columns.rate if rate is None and columns is not None else rate
         # Recorded velocities over the derivatives of positions.
-        self.factors = {} if excerpt is None else factors_of(
-            excerpt.velocity, excerpt.motion.velocity)
+        self.factors = factors_of(excerpt.velocity, excerpt.motion.velocity)
         turning = [units.turns for units in model.units]
-        self.rows = readings(model.drives, model.units, self._loads(), _time_units(recording),
+        self.rows = readings(model.drives, model.units, self._loads(), [*self._excerpts][1:],
                              bool(np.all(recording.position[:, turning] % 1 == 0)))
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any.
@@ -203,22 +206,21 @@ class Search:
         most = model.bound(PayloadMass).linear[0].upper
         return [load for share in table.LOADS if (load := share * model.robot.moved_mass) < most]
 
-    def excerpt(self, unit: float) -> Excerpt | None:
-        """Return an excerpt whose times are in a unit [s]."""
-        if unit not in self._excerpts:
-            plain = self._excerpts.get(1.0)
-            # Gaps are other ones in milliseconds.
-            self._excerpts[unit] = plain.slower(unit) if plain and unit not in table.TIMES else (
-                excerpt_of(self.recording, table.STRETCHES, unit))
-        return self._excerpts[unit]
+    def excerpt(self, reading: Reading) -> Excerpt:
+        """Return the excerpt in the unit of time of a reading."""
+        unit = reading.time_unit
+        return self._excerpts.get(unit) or self._excerpts[1.0].slower(unit)
+
+    def motion(self, reading: Reading) -> DriveMotion:
+        """Return the motion in a reading."""
+        return read_motion(self.excerpt(reading).motion, reading)
 
     def evidence(self, reading: Reading) -> Evidence | None:
         """Return the evidence of a reading; the plain motion may be followed in pieces."""
         key = reading.of_motion
         if key not in self._evidence:
-            excerpt = self.excerpt(reading.time_unit)
-            self._evidence[key] = None if excerpt is None else Evidence.of(
-                in_reading(self.model, reading), excerpt,
+            self._evidence[key] = Evidence.of(
+                in_reading(self.model, reading), self.excerpt(reading),
                 None if key == self.rows[0].of_motion else reading)
         return self._evidence[key]
 
@@ -285,9 +287,8 @@ class Search:
 
     def mounting(self, before: Reading) -> list[Reading]:
         """Return the row with the gravity that explains what another reading does not."""
-        excerpt = self.excerpt(before.time_unit)
-        row = None if excerpt is None or 'mounting' in before.kinds or not self.has_gain else (
-            mounting_in(self.model, excerpt, before))
+        row = None if 'mounting' in before.kinds or not self.has_gain else (
+            mounting_in(self.model, self.excerpt(before), before))
         return [] if row is None else [row]
 
     def _rates(self, before: Reading) -> Iterator[Reading]:
@@ -364,8 +365,8 @@ class Search:
 
     def fits_of(self, reading: Reading) -> list[Fit]:
         """Return a reading with each scale that its efforts may have; none where it cannot be."""
-        excerpt = self.excerpt(reading.time_unit)
-        if excerpt is None or (reading.kinds and not self._possible(reading)):
+        excerpt = self.excerpt(reading)
+        if reading.kinds and not self._possible(reading):
             return []
         cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
         if not np.isfinite(excerpt.effort).any():
@@ -478,13 +479,10 @@ class Search:
 
     def _possible(self, reading: Reading) -> bool:
         """Return whether a reading brings positions into the strokes."""
-        excerpt = self.excerpt(reading.time_unit)
-        if excerpt is None:
-            return False
         lower, upper = self.strokes
         with np.errstate(invalid='ignore'):
             slack = table.STROKE_SLACK * (upper - lower)
-        position = read_motion(excerpt.motion, reading).position
+        position = self.motion(reading).position
         # Drives may report angles from 0 to a turn.
         turns = np.array([units.turns for units in self.model.units]) & np.isfinite(upper - lower)
         middle = np.mean(np.where(turns, (lower, upper), 0.0), axis=0)
@@ -497,18 +495,12 @@ class Search:
 
     def _reach(self, reading: Reading) -> Array:
         """Return the largest positions over the ends of the strokes, (D,)."""
-        excerpt = self.excerpt(reading.time_unit)
-        if excerpt is None:
-            return np.zeros(len(self.model.drives))
-        reach = np.abs(read_motion(excerpt.motion, reading).position).max(axis=0)
+        reach = np.abs(self.motion(reading).position).max(axis=0)
         return np.asarray(reach / np.maximum(*np.abs(self.strokes)))
 
     def _outside(self, reading: Reading) -> float:
         """Return the cost of positions and speeds that are beyond their limits."""
-        excerpt = self.excerpt(reading.time_unit)
-        if excerpt is None:
-            return 0.0
-        motion = read_motion(excerpt.motion, reading)
+        motion = self.motion(reading)
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
             np.isfinite(self.strokes[0]), self.model.robot.structure.speed, np.inf)
         most = float(np.max(np.maximum(self._reach(reading), speed)))

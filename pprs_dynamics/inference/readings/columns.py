@@ -36,7 +36,8 @@ from pprs_dynamics.inference.readings.names import (
     unit_of,
     words_of,
 )
-from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
+from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY, Reading
+from pprs_dynamics.inference.residuals.excerpt import excerpt_of
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import (
@@ -394,10 +395,13 @@ def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: fl
     velocity = values[known][:, layout.blocks[VELOCITY]] if VELOCITY in layout.blocks else None
     firsts = held_poses(position, time[known], velocity)
     edges = [*firsts.tolist(), len(position)] if len(firsts) else [0, len(position)]
-    search = Search(model, Recording(
+    recording = Recording(
         model.drives, time[known], position, velocity, efforts, name='',
-        segments=tuple(starmap(slice, pairwise(edges))), are_poses=len(firsts) > 0),
-        is_first=True, rate=rate)
+        segments=tuple(starmap(slice, pairwise(edges))), are_poses=len(firsts) > 0)
+    excerpt = excerpt_of(recording, table.STRETCHES)
+    if excerpt is None:
+        return Fit(Reading.plain(len(model.drives)), layout.evidence)
+    search = Search(model, recording, excerpt, is_first=True, rate=rate)
     fit = search.best()
     evidence = search.evidence(fit.reading)
     # A column that certainly holds inertia or weight is an effort in some unit.

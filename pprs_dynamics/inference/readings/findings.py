@@ -214,11 +214,13 @@ def factors_of(recorded: Array | None, true: Array, least: float = table.ALIKE,
 
 def find_motion(model: DriveModel, excerpt: Excerpt) -> Iterator[OtherReading]:
     """Yield efforts that are the recorded motion itself."""
-    motion = ('position', 'velocity', 'acceleration')
+    motion, effort = ('position', 'velocity', 'acceleration'), excerpt.effort
+    swing = effort - np.nanmean(np.where(np.isfinite(effort).any(axis=0), effort, 0.0), axis=0)
     for quantity in motion if model.effort_kind not in KINDS else ():
-        found = factors_of(excerpt.effort, getattr(excerpt.motion, quantity), table.COPY)
+        true = getattr(excerpt.motion, quantity)
+        found = factors_of(swing, true - true.mean(axis=0), table.COPY)
         group = [d for d, (factor, doubt) in found.items() if near(factor, (1.0,), doubt)]
-        if group:
+        if group and len(group) == np.sum(np.nanmax(np.abs(swing), axis=0, initial=0.0) > 0):
             yield OtherReading.of(
                 'effort_motion', model.drives, group,
                 f'the effort of {named(model.drives, tuple(group))} is '

@@ -80,9 +80,8 @@ def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str,
                 ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
     kinds = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
-    for words in ({word for word in key if len(word) > 1}, {*key}):
-        # A single letter next to a word is a prefix of programmers.
-        kinds = kinds or {kind for kind, known in table.WORDS.items() if words & {*known}}
+    # A single letter next to a word is a prefix of programmers.
+    kinds = kinds or _kinds_of({word for word in key if len(word) > 1}) or _kinds_of({*key})
     is_german = bool({*key} & {'ist', 'soll'})
     if not kinds and is_german and 'm' in key:
         kinds.add(EFFORT)
@@ -102,10 +101,15 @@ def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str,
             -float(len(key)))
 
 
+def _kinds_of(words: set[str]) -> set[str]:
+    """Return the quantities that some words name."""
+    return {kind for kind, known in table.WORDS.items() if words & {*known, f'<{kind}>'}}
+
+
 def may_be(title: str, quantity: str) -> bool:
     """Return whether the words of a name say no other quantity."""
     words = {*words_of(title)}
-    kinds = {kind for kind, known in table.WORDS.items() if words & {*known, f'<{kind}>'}}
+    kinds = _kinds_of(words)
     return not words & table.OTHERS and (not kinds or quantity in kinds or (
         quantity == EFFORT and CURRENT in kinds))
 
