@@ -114,11 +114,12 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     excerpt = excerpt_of(recording, table.STRETCHES)
     if excerpt is None:
         return tuple(find_shares(model))
-    if found := tuple(find_motion(model, excerpt)):
-        return found
     search = Search(model, recording, excerpt, is_first)
+    likely = search.likely()
+    if not search.explains and (found := tuple(find_motion(model, excerpt))):
+        return found
     by_reading = []
-    for fit in search.likely() or [Fit(search.rows[0])]:
+    for fit in likely or [Fit(search.rows[0])]:
         said = findings_of(model, recording, fit.reading)
         if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
             said += find_other_velocities(model, search.factors, fit.reading.time_unit)
@@ -189,7 +190,7 @@ class Search:
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
         self.has_gain = knows_forces(model)  # without it masses and units are no evidence
         self.masses = table.MASSES if self.has_gain else np.inf
-        self.start = Fit(self.rows[0])
+        self.start, self.explains = Fit(self.rows[0]), False
         self.fits: list[Fit] = []
         self._evidence: dict[bytes, Evidence | None] = {}
         self.strokes = self._strokes()
@@ -249,12 +250,12 @@ class Search:
         # Without masses a gravity of any size may explain positions in another unit.
         explains = not start.reading.kinds - {'rate'} and np.all(
             start.reading.effort_scale == 1) and self.has_gain and start.prior < table.PLAUSIBLE
-        # Hardly anything may be explained better.
         if explains and start.largest_residual < table.CLOSE_FIT:
+            self.explains = True  # hardly anything may be explained better
             return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
-        tried = {'position_unit', 'drive_order'} if explains and (
-            start.largest_residual < table.EXPLAINED) else {*table.COST}
+        self.explains = bool(explains and start.largest_residual < table.EXPLAINED)
+        tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST}
         seed = None
         while self._top() is not seed:
             seed = self._top()

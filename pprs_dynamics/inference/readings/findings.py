@@ -220,7 +220,7 @@ def find_motion(model: DriveModel, excerpt: Excerpt) -> Iterator[OtherReading]:
         true = getattr(excerpt.motion, quantity)
         found = factors_of(swing, true - true.mean(axis=0), table.COPY)
         group = [d for d, (factor, doubt) in found.items() if near(factor, (1.0,), doubt)]
-        if group and len(group) == np.sum(np.nanmax(np.abs(swing), axis=0, initial=0.0) > 0):
+        if group and len(group) == np.sum(np.any(np.nan_to_num(swing), axis=0)):
             yield OtherReading.of(
                 'effort_motion', model.drives, group,
                 f'the effort of {named(model.drives, tuple(group))} is '
