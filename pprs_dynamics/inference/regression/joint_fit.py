@@ -33,7 +33,6 @@ from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
-    DriveEquations,
     NormalEquations,
     Posterior,
     Prior,
@@ -52,7 +51,6 @@ LEAST_POSES = 10  # that are held: their errors are independent
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
-NOISE_STEPS = 2  # of the noise in a round
 MOST_BEYOND, MOST_BACK = 2.0, 0.6  # of the last round's change of the noise, when it is accelerated
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 8000  # products of blocks on a drive, both ways, that are kept: some 10 kB each
@@ -236,13 +234,10 @@ class Regression:
         return {(a, b): known[a, b, d] for k, a in enumerate(blocks)
                 for b in (None, *blocks[:k + 1])}
 
-    def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
-        """Return the equations of a drive and the blocks that act on it."""
-        return DriveEquations(self.base_products[d], acting, self.products(acting, d))
-
     def system(self, blocks: Sequence[Block]) -> NormalEquations:
         """Return the normal equations of blocks and the base columns."""
-        return NormalEquations(self.columns, self.base_index, blocks, self.equations)
+        return NormalEquations(self.columns, self.base_index, self.base_products, blocks,
+                               self.products)
 
     def fit(self, blocks: Sequence[Block], start: JointFit | Array | None = None) -> JointFit:
         """Return the fit of blocks with the base columns and the noise.
@@ -254,13 +249,13 @@ class Regression:
             A fit or the amplitudes of the noise to start from.
         """
         system, shapes = self.system(blocks), self.noise_shapes
-        found = self._solved(system, blocks, shapes.start(np.stack([
-            drive.squares for drive in system.drives]), self.counts) if start is None else start)
+        found = self._solved(system, blocks, shapes.start(system.squares, self.counts)
+                             if start is None else start)
         last, steps = np.inf, list[tuple[Array, Array]]()
         for _ in range(MOST_ROUNDS - 1):
             before = found.deviance
             fitted = shapes.fitted(found.amplitudes, found.squares, self.counts,
-                                   system.leverage(found.covariance, found.spectra), NOISE_STEPS)
+                                   system.leverage(found.covariance, found.spectra))
             steps = [*steps[-1:], (fitted, np.log(fitted @ shapes.at_bands[:, 1:]
                                                   / found.spectra[:, 1:]))]
             found = self._solved(system, blocks, self._accelerated(*steps))
@@ -327,13 +322,9 @@ class Regression:
         A = np.zeros((len(equalities.b), len(fit.coefficients)))
         A[:, index] = equalities.A
         found = conditioned(fit.coefficients, fit.covariance, Inequalities(A, equalities.b))
-        coefficients = found.coefficients
-        squares = np.empty_like(fit.squares)
-        for k, d in enumerate(self.drives):
-            place, acting = self.local(fit, d)
-            squares[k] = self.equations(d, tuple(acting)).left(coefficients[place])
-        return replace(fit, coefficients=coefficients, covariance=found.covariance,
-                       squares=squares, deviance=fit.deviance + found.rise)
+        return replace(fit, coefficients=found.coefficients, covariance=found.covariance,
+                       squares=self.system(fit.blocks).left(found.coefficients),
+                       deviance=fit.deviance + found.rise)
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""

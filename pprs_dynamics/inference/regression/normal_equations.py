@@ -212,61 +212,6 @@ class Posterior:
     beyond: Array
 
 
-class DriveEquations:
-    """Band sums of one drive's columns with each other and with the error.
-
-    Columns are those of the base, then of the blocks in order.
-
-    Parameters
-    ----------
-    base : (B, K + 1, K + 1) array
-        Of the columns of the base and the error with each other.
-    acting : sequence of Block
-        With rows on the drive.
-    products : mapping of (Block, Block or None) to array
-        Of pairs of blocks, and of each with the base and the error (None).
-    """
-
-    def __init__(self, base: Array, acting: Sequence[Block],
-                 products: Mapping[tuple[Block, Block | None], Array]) -> None:
-        count, first = base.shape[0], base.shape[1] - 1
-        size = first + sum(block.size for block in acting)
-        gram = np.empty((count, size, size))
-        side = np.empty((count, size))
-        gram[:, :first, :first] = base[:, :-1, :-1]
-        side[:, :first] = base[:, :-1, -1]
-        places = dict(zip(acting, accumulate((block.size for block in acting), initial=first),
-                          strict=False))
-        for (a, b), product in products.items():
-            rows = slice(places[a], places[a] + a.size)
-            if b is None:
-                gram[:, rows, :first] = product[:, :, :-1]
-                gram[:, :first, rows] = product[:, :, :-1].transpose(0, 2, 1)
-                side[:, rows] = product[:, :, -1]
-            else:
-                other = slice(places[b], places[b] + b.size)
-                gram[:, rows, other] = product
-                gram[:, other, rows] = product.transpose(0, 2, 1)
-        self.gram, self.side, self.squares = gram, side, base[:, -1, -1]
-        self._flat = gram.reshape(count, -1)
-
-    def weighted(self, weights: Array) -> tuple[Array, Array]:
-        """Return X^T S^-1 X and X^T S^-1 y."""
-        size = self.gram.shape[1]
-        return (weights @ self._flat).reshape(size, size), weights @ self.side
-
-    def left(self, coefficients: Array) -> Array:
-        """Return the sums of squares that coefficients leave in the bands, (B,)."""
-        explained = self.gram @ coefficients
-        left: Array = self.squares - 2 * self.side @ coefficients + explained @ coefficients
-        return np.maximum(left, 1e-12 * self.squares)
-
-    def leverage(self, covariance: Array, weights: Array) -> Array:
-        """Return the degrees of freedom spent in the bands, (B,), by a flat covariance."""
-        spent: Array = weights * (self._flat @ covariance)
-        return spent
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A fit at some noise.
@@ -289,47 +234,69 @@ class Solution:
 
 
 class NormalEquations:
-    """The normal equations of all drives.
+    """The normal equations of all drives: band sums of columns with each other and the error.
+
+    Those of a drive are its base columns, then its blocks in order; drives with fewer columns have
+    empty ones as well, whose coefficient is one after the last.
 
     Parameters
     ----------
     columns : sequence of BaseColumn
     base_index : mapping of drive to int array
         Places of those that a drive feels.
+    base_products : mapping of drive to (B, K + 1, K + 1) array
+        Of these and the error with each other.
     blocks : sequence of Block
-    equations : callable
-        Returns those of a drive and the blocks that it feels.
+    products : callable
+        Returns products of pairs of blocks, and of each with the base and the error (None), from
+        the blocks that a drive feels and the drive.
     """
 
     def __init__(self, columns: Sequence[BaseColumn], base_index: Mapping[int, Integers],
-                 blocks: Sequence[Block],
-                 equations: Callable[[int, tuple[Block, ...]], DriveEquations]) -> None:
+                 base_products: Mapping[int, Array], blocks: Sequence[Block],
+                 products: Callable[[Sequence[Block], int],
+                                    Mapping[tuple[Block, Block | None], Array]]) -> None:
         self.prior = Prior.of(columns, blocks)
-        place = len(columns)
-        self.places: dict[Block, slice] = {}
-        for block in blocks:
-            self.places[block] = slice(place, place + block.size)
-            place += block.size
-        self.drives: list[DriveEquations] = []
-        self.indices: list[Integers] = []
-        self._pairs: list[Integers] = []  # of these, in a flat (P, P) array
+        ends = accumulate((block.size for block in blocks), initial=len(columns))
+        self.places = {block: slice(end, end + block.size)
+                       for block, end in zip(blocks, ends, strict=False)}
         self._beyond: Array | None = None  # of the solution before
-        for d, index in base_index.items():
-            acting = tuple(block for block in blocks if d in block.rows)
-            self.drives.append(equations(d, acting))
-            self.indices.append(np.concatenate([index, *(
-                np.arange(self.places[block].start, self.places[block].stop) for block in acting)]))
-            self._pairs.append(np.add.outer(place * self.indices[-1], self.indices[-1]).ravel())
+        acting = {d: [block for block in blocks if d in block.rows] for d in base_index}
+        most = max(len(index) + sum(block.size for block in acting[d])
+                   for d, index in base_index.items())
+        bands, self._count = len(next(iter(base_products.values()))), len(self.prior.mean)
+        self.index = np.full((len(base_index), most), self._count)
+        self.squares = np.stack([base[:, -1, -1] for base in base_products.values()])
+        gram = np.zeros((len(base_index), bands, most, most))
+        self.side = np.zeros((len(base_index), bands, most))
+        for k, (d, index) in enumerate(base_index.items()):
+            first, base = len(index), base_products[d]
+            self.index[k, :first] = index
+            gram[k, :, :first, :first] = base[:, :-1, :-1]
+            self.side[k, :, :first] = base[:, :-1, -1]
+            rows = dict[Block | None, slice]({None: slice(0, first)})
+            for block in acting[d]:
+                rows[block] = slice(first, first := first + block.size)
+                self.index[k, rows[block]] = np.arange(
+                    self.places[block].start, self.places[block].stop)
+            for (one, other), product in products(acting[d], d).items():
+                if other is None:
+                    self.side[k, :, rows[one]] = product[:, :, -1]
+                    product = product[:, :, :-1]
+                gram[k, :, rows[one], rows[other]] = product
+                gram[k, :, rows[other], rows[one]] = product.transpose(0, 2, 1)
+        self._flat = gram.reshape(len(gram), bands, -1)
+        self._pairs = ((self._count + 1) * self.index[:, :, None] + self.index[:, None, :]).reshape(
+            len(gram), -1)
 
     def weighted(self, weights: Array) -> tuple[Array, Array]:
         """Return X^T S^-1 X and X^T S^-1 y of all drives, for weights (D, B)."""
-        gram, side = np.zeros_like(self.prior.precision), np.zeros(len(self.prior.mean))
-        for k, (drive, index, pairs) in enumerate(zip(
-                self.drives, self.indices, self._pairs, strict=True)):
-            products, with_error = drive.weighted(weights[k])
-            gram.reshape(-1)[pairs] += products.reshape(-1)
-            side[index] += with_error
-        return gram, side
+        weights, size = weights[:, None, :], self._count + 1
+        gram, side = (np.bincount(
+            index.ravel(), (weights @ of_bands).ravel(), length).astype(float, copy=False)
+            for index, of_bands, length in ((self._pairs, self._flat, size ** 2),
+                                            (self.index, self.side, size)))
+        return gram.reshape(size, size)[:-1, :-1], side[:-1]
 
     def uncertainty(self, spectra: Array) -> Array:
         """Return the reported covariance (P, P) of coefficients, under noise spectra (D, B).
@@ -350,14 +317,21 @@ class NormalEquations:
         weights = 1 / spectra
         found = self.prior.posterior(*self.weighted(weights), self._beyond)
         self._beyond = found.beyond
-        squares = np.stack([drive.left(found.coefficients[index])
-                            for drive, index in zip(self.drives, self.indices, strict=True)])
+        squares = self.left(found.coefficients)
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
                          + found.penalty + found.log_det)
         return Solution(found.coefficients, found.covariance, deviance, squares)
 
+    def left(self, coefficients: Array) -> Array:
+        """Return the sums of squares that coefficients leave in the bands of drives, (D, B)."""
+        c = np.append(coefficients, 0.0)[self.index]
+        gram = self._flat.reshape(*self.side.shape, c.shape[1])
+        explained = (gram @ c[:, None, :, None])[..., 0]
+        left: Array = self.squares + ((explained - 2 * self.side) @ c[:, :, None])[..., 0]
+        return np.maximum(left, 1e-12 * self.squares)
+
     def leverage(self, covariance: Array, spectra: Array) -> Array:
         """Return the degrees of freedom spent in the bands of all drives, (D, B)."""
-        return np.stack([
-            drive.leverage(covariance.reshape(-1)[pairs], weights) for drive, pairs, weights
-            in zip(self.drives, self._pairs, 1 / spectra, strict=True)])
+        spent: Array = (self._flat @ np.pad(covariance, (0, 1)).reshape(-1)[
+            self._pairs][:, :, None])[..., 0] / spectra
+        return spent

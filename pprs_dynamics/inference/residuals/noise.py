@@ -42,8 +42,9 @@ from pprs_dynamics.physics.mechanism.evaluation import run
 # Scoring ends once a full step promises to lower -2 ln of the likelihood by less; a step is halved
 # until it brings a share of what it promises (Armijo), or is shorter than the least.
 CONVERGED, MOST_STEPS, SUFFICIENT, LEAST_STEP = 1e-4, 30, 1e-4, 1e-4
-# Sweeps over the amplitudes in a step, and fall of -2 ln of the likelihood that ends them.
-MOST_SWEEPS, LEAST_FALL = 3000, 1e-12
+# Changes of which amplitudes are at their least in a step, fall of -2 ln of the likelihood for one,
+# and share of a pivot that is rounding.
+MOST_CHANGES, LEAST_FALL, ROUNDING = 100, 1e-12, 1e-13
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Exponents s of noise that goes on below the record, the prior odds of each against one corner, and
 # how far down S of a constant is taken. Share of constants beyond three standard deviations where
@@ -135,8 +136,7 @@ class NoiseShapes:
         count = len(self.at_bands)
         return np.repeat(np.maximum(mean, LEAST_POWER)[..., None] / count, count, axis=-1)
 
-    def fitted(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array,
-               steps: int = MOST_STEPS) -> Array:
+    def fitted(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array) -> Array:
         """Return the amplitudes that maximise the likelihood, (D, J + 1).
 
         Parameters
@@ -149,16 +149,14 @@ class NoiseShapes:
             Coefficients in the bands.
         leverage : (D, B) array
             Degrees of freedom that the regression spends there.
-        steps : int
-            At most: a regression that is fitted anew does not need the end of the way.
         """
         squares, free = squares[:, 1:].copy(), np.maximum(
             counts[:, 1:] - leverage[:, 1:], 0.02 * counts[:, 1:])
         least = LEAST_SHARE * squares.sum(axis=1) / np.maximum(free.sum(axis=1), 1) + LEAST_POWER
         found: Array = np.maximum(amplitudes, least[:, None])
         size, bands = self.at_bands.shape
-        run(maximise_likelihood, found, squares, free, least, self.at_bands[:, 1:].copy(), steps,
-            np.empty((3, bands)), np.empty((2, size)), np.empty((size, size)))
+        run(maximise_likelihood, found, squares, free, least, self.at_bands[:, 1:].copy(),
+            np.empty((3, bands)), np.empty((4, size)), np.empty((2, size, size)))
         return found
 
 
@@ -213,7 +211,7 @@ def extrapolate(power: Array, counts: Array, slow: Array, of_constant: Array, fo
 
 
 def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array, phi: Array,
-                        steps: int, bands: Array, sizes: Array, gram: Array) -> None:
+                        bands: Array, sizes: Array, grams: Array) -> None:
     """Move amplitudes to where their likelihood is highest: a loop over drives.
 
     Scoring is a regression of the bands' mean squares on the shapes, whose weights follow from the
@@ -228,15 +226,14 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
     least : (D,) array
         That every amplitude keeps [N^2].
     phi : (J, B) array
-    steps : int
-        At most.
     bands : (3, B) array
-    sizes : (2, J) array
-    gram : (J, J) array
+    sizes : (4, J) array
+    grams : (2, J, J) array
         Work space.
     """
     power, root, change = bands[0], bands[1], bands[2]
-    side, above = sizes[0], sizes[1]
+    side, above, free_of, solved = sizes[0], sizes[1], sizes[2], sizes[3]
+    gram, factor = grams[0], grams[1]
     for d in range(found.shape[0]):
         before = 0.0
         for b in range(phi.shape[1]):
@@ -244,7 +241,7 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
             for j in range(phi.shape[0]):
                 power[b] += found[d, j] * phi[j, b]
             before += free[d, b] * math.log(power[b]) + squares[d, b] / power[b]
-        for _ in range(steps):
+        for _ in range(MOST_STEPS):
             for b in range(phi.shape[1]):
                 root[b] = free[d, b] / (power[b] * power[b])
                 change[b] = squares[d, b] / max(free[d, b], 1e-300)
@@ -261,7 +258,7 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
                     gram[i, j] = gram[j, i] = total
             for j in range(phi.shape[0]):
                 above[j] = max(found[d, j] - least[d], 0.0)
-            solve_non_negative(gram, side, above)
+            solve_non_negative(gram, side, above, free_of, solved, factor)
             promised = 0.0
             for b in range(phi.shape[1]):
                 change[b] = 0.0
@@ -287,8 +284,9 @@ def maximise_likelihood(found: Array, squares: Array, free: Array, least: Array,
                 power[b] += share * change[b]
 
 
-def solve_non_negative(gram: Array, side: Array, found: Array) -> None:
-    """Move x to where x' G x - 2 x' s is least with x >= 0, one coordinate after the other.
+def solve_non_negative(gram: Array, side: Array, found: Array, free: Array, solved: Array,
+                       factor: Array) -> None:
+    """Move x to where x' G x - 2 x' s is least with x >= 0, by an active set.
 
     Parameters
     ----------
@@ -298,18 +296,54 @@ def solve_non_negative(gram: Array, side: Array, found: Array) -> None:
         s
     found : (J,) array
         x to start from, written to.
+    free, solved : (J,) array
+    factor : (J, J) array
+        Work space.
     """
-    for _ in range(MOST_SWEEPS):
-        fall = 0.0
+    for i in range(len(side)):
+        free[i] = 1.0 if found[i] > 0 else 0.0
+    for _ in range(MOST_CHANGES):
+        solve_free(gram, side, free, solved, factor)
+        share, changed = 1.0, -1
+        for i in range(len(side)):
+            if solved[i] < 0 and found[i] <= share * (found[i] - solved[i]):
+                share, changed = found[i] / (found[i] - solved[i]), i
+        for i in range(len(side)):
+            found[i] += share * (solved[i] - found[i])
+        if changed >= 0:
+            found[changed] = free[changed] = 0.0
+            continue
+        fall = LEAST_FALL
         for i in range(len(side)):
             slope = side[i]
             for j in range(len(side)):
                 slope -= gram[i, j] * found[j]
-            step = max(slope / gram[i, i], -found[i])
-            found[i] += step
-            fall += step * (2 * slope - step * gram[i, i])
-        if fall < LEAST_FALL:
+            if free[i] == 0 and slope > 0 and slope * slope > fall * gram[i, i]:
+                fall, changed = slope * slope / gram[i, i], i
+        if changed < 0:
             return
+        free[changed] = 1.0
+
+
+def solve_free(gram: Array, side: Array, free: Array, solved: Array, factor: Array) -> None:
+    """Write the solution of G x = s for free unknowns, by Cholesky's factor; others are 0."""
+    for i in range(len(side)):
+        total = side[i]
+        for j in range(i + 1):
+            inner = gram[i, j]
+            for k in range(j):
+                inner -= factor[i, k] * factor[j, k]
+            if i == j:
+                factor[i, i] = math.sqrt(max(inner, ROUNDING * gram[i, i]))
+            else:
+                factor[i, j] = free[i] * free[j] * inner / factor[j, j]
+                total -= factor[i, j] * solved[j]
+        solved[i] = free[i] * total / factor[i, i]
+    for i in range(len(side) - 1, -1, -1):
+        total = solved[i]
+        for j in range(i + 1, len(side)):
+            total -= factor[j, i] * solved[j]
+        solved[i] = total / factor[i, i]
 
 
 @dataclass(frozen=True)

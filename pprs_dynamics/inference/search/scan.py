@@ -41,6 +41,7 @@ class Scan:
 
     def __init__(self, fits: FittedSets) -> None:
         self.fits = fits
+        self._offers: dict[Hashable, dict[type[CatalogueEffect], list[Scored]]] = {}
 
     def proposals(self, base: CandidateSet, count: int | None = None, least: float = PROPOSED,
                   ) -> list[Candidates]:
@@ -71,6 +72,9 @@ class Scan:
     def offers(self, base: CandidateSet) -> dict[type[CatalogueEffect], list[Scored]]:
         """Return gains less prior costs of components, by effect; one for each drive or place."""
         components, fit = self.fits.components, base.fit
+        known = (base.key, fit.coefficients.tobytes(), fit.amplitudes.tobytes())
+        if known in self._offers:
+            return self._offers[known]
         taken = {(component.effect, component.drive) for component in base.blocks}
 
         offers: list[tuple[Component, float]] = []
@@ -88,6 +92,7 @@ class Scan:
         found: dict[type[CatalogueEffect], list[Scored]] = {}
         for scored in best.values():
             found.setdefault(scored[1].effect, []).append(scored)
+        self._offers[known] = found
         return found
 
     def offered(self, effect: type[CatalogueEffect], drives: Collection[int] | None,
