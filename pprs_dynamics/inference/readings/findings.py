@@ -358,12 +358,11 @@ def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares], has_
                                  f'{model.effort_kind}'),)
     kinds = {drive: content.kind for drive, content in contents.items()}
     # What one drive shows certainly is true of all: they are recorded in the same way.
-    weighs = any(content.shows_gravity and not content.lacks_gravity
-                 for content in contents.values())
-    moves = any(content.inertia_doubt < table.LEAST_SHARE and not content.lacks_inertia
-                for content in contents.values())
     # Forces of an unknown size cannot be compared with a model's.
-    weighs, moves = weighs or not has_gain, moves or not has_gain
+    weighs, moves = not has_gain, not has_gain
+    for content in contents.values():
+        weighs |= abs(content.gravity) > table.LEAST_SHARE > content.gravity_doubt
+        moves |= abs(content.inertia) > table.LEAST_SHARE > content.inertia_doubt
     excluded = ({table.WITHOUT_GRAVITY, table.EXTERNAL} if weighs else set()) | (
         {table.COMMAND, table.POSITION_ERROR, table.EXTERNAL} if moves else set())
     kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
