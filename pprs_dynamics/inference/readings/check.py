@@ -118,9 +118,17 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     likely = search.likely()
     if not search.explains and (found := tuple(find_motion(model, excerpt))):
         return found
-    by_reading = []
+    evidence = search.evidence(search.rows[0])
+    others = () if evidence is None else find_no_measurements(
+        model, effort_contents(model, recording, evidence), search.has_gain)
+    by_reading: list[list[Mistake]] = []
+    # A command has no inertia, and in a smaller unit of positions an effort has none either.
+    if likely and likely[0].reading.kinds == {'position_unit'} and any(
+            other.kind == table.COMMAND for other in others) and np.all(
+                search.reach(search.rows[0]) < table.BEYOND):
+        by_reading.append([*others])
     for fit in likely or [Fit(search.rows[0])]:
-        said = findings_of(model, recording, fit.reading)
+        said: list[Mistake] = [*findings_of(model, recording, fit.reading)]
         if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
             said += find_other_velocities(model, search.factors, fit.reading.time_unit)
         by_reading.append(said)
@@ -136,14 +144,10 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
                 ' and '.join(mistake.what for mistake in said) or PLAIN for said in by_reading),
             ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
     mistakes += find_shares(model)
-    evidence = search.evidence(search.rows[0])
     if evidence is None or any(isinstance(mistake, OtherReading) for mistake in mistakes):
         return tuple(mistakes)
     mistakes += find_unsigned(model, recording, excerpt, evidence)
-    if not mistakes:
-        mistakes += find_no_measurements(
-            model, effort_contents(model, recording, evidence), search.has_gain)
-    return tuple(mistakes)
+    return tuple(mistakes or others)
 
 
 def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
@@ -270,7 +274,7 @@ class Search:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
         best = self.best()
         if best.reading.is_plain or best.residual > table.GOOD_FIT:
-            far = self._reach(self.start.reading) > table.FAR
+            far = self.reach(self.start.reading) > table.FAR
             if best.residual <= table.GOOD_FIT:
                 # Angles that explain the efforts are in the right unit, whatever limits say.
                 far &= [not units.turns for units in self.model.units]
@@ -494,7 +498,7 @@ class Search:
         of_motion = sorted({k for part in reading.parts for k in part.drives}) or slice(None)
         return not np.any(((position < lower - slack) | (position > upper + slack))[:, of_motion])
 
-    def _reach(self, reading: Reading) -> Array:
+    def reach(self, reading: Reading) -> Array:
         """Return the largest positions over the ends of the strokes, (D,)."""
         reach = np.abs(self.motion(reading).position).max(axis=0)
         return np.asarray(reach / np.maximum(*np.abs(self.strokes)))
@@ -504,7 +508,7 @@ class Search:
         motion = self.motion(reading)
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
             np.isfinite(self.strokes[0]), self.model.robot.structure.speed, np.inf)
-        most = float(np.max(np.maximum(self._reach(reading), speed)))
+        most = float(np.max(np.maximum(self.reach(reading), speed)))
         used = np.ptp(motion.position, axis=0) / (self.strokes[1] - self.strokes[0])
         used = used[np.isfinite(used) & (used > 0)]
         tiny = float(np.mean(np.maximum(np.log(table.USED / used), 0.0))) if len(used) else 0.0
