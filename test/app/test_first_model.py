@@ -142,7 +142,7 @@ def with_what_was_asked_for(folder: Path) -> list[Path]:
 def structure(folder: Path) -> list[Path]:
     savemat(folder / 'run.mat', {'rec': {
         'time': TIME, 'act_pos_mot_deg': np.rad2deg(Q), 'act_vel_mot_deg': np.rad2deg(DQ),
-        'act_trq': TAU, 'temperature': Q}})
+        'act_trq': TAU, 'temperature': Q[:99]}})
     return [folder / 'run.mat']
 
 
@@ -266,6 +266,10 @@ def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path
     np.savetxt(tmp_path / 'd.txt', Q.ravel())
     with pytest.raises(GuessError, match='`paste - - - < FILE > NEW` joins 3 lines'):
         first_model(robot, [tmp_path / 'd.txt'])
+    for name, values in (('q', Q), ('tau', TAU)):
+        np.savetxt(tmp_path / f'{name}.txt', values[:, :2])
+    with pytest.raises(GuessError, match='give --drives shoulder_pan,shoulder_lift'):
+        first_model(robot, [tmp_path / 'q.txt', tmp_path / 'tau.txt'])
     (tmp_path / 'x.urdf').write_text('<robot name="x"><link name="a"/></robot>')
     with pytest.raises(FirstModelError, match='no joint of it moves'):
         first_model(tmp_path / 'x.urdf')

@@ -195,8 +195,7 @@ def arm_recording(model: DriveModel, motion: float | list[float] = 1.0,
     return recording(scaled(motion=motion, effort=effort)(arrays), model.drives)
 
 
-def read_as_told(model: DriveModel, folder: Path, run: Recording,
-                 ) -> tuple[str, tuple[Defect, ...]]:
+def read_as_told(model: DriveModel, folder: Path, run: Recording) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
     readings = [m for m in find_mistakes(model, run) if isinstance(m, OtherReading)]
     line = columns_line([scale for reading in readings for scale in reading.scales])

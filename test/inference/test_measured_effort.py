@@ -130,8 +130,7 @@ def test_a_gain_and_a_sign_are_no_command(run: Run, gain: float) -> None:
 
 def test_a_law_of_gravity_is_a_command(run: Run) -> None:
     size = np.abs(run.total).max(axis=0)
-    effort = 1.1 * run.gravity + 1e-3 * size * np.random.default_rng(3).normal(
-        size=run.total.shape)
+    effort = 1.1 * run.gravity + 1e-3 * size * np.random.default_rng(3).normal(size=run.total.shape)
     found = run.kinds(effort, 0.0)
     assert found is not None
     assert set(found.values()) == {'command'}
@@ -200,8 +199,7 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
     recording = run.of(run.total - run.gravity)
     assert looks_like(model, [recording]) == {}
     motion = arm.motion(DURATION, RATE)
-    np.testing.assert_allclose(model.drive_forces(motion).total, run.total - run.gravity,
-                               atol=1e-9)
+    np.testing.assert_allclose(model.drive_forces(motion).total, run.total - run.gravity, atol=1e-9)
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:

@@ -145,15 +145,20 @@ def test_measured_currents_come_before_efforts_that_are_none(other: str, tmp_pat
     np.testing.assert_allclose(found.effort, 0.1 * truth['tau'], atol=1e-6)
 
 
-def test_without_names_what_was_asked_for_is_not_what_was_measured(tmp_path: Path) -> None:
+@pytest.mark.parametrize('moving', [(1.0, 1.0), (1.0, 0.0)])
+def test_without_names_what_was_asked_for_is_not_what_was_measured(
+    moving: tuple[float, float], tmp_path: Path,
+) -> None:
     random = np.random.default_rng(2)
-    _, q, v, a = motion(random, 2, 1.0)
+    q, v, a = (moving * values for values in motion(random, 2, 1.0)[1:])
     late = np.roll(np.arange(len(q)), 2)
     late[:2] = 0
     measured = q[late] + random.normal(0, 2e-5, q.shape)
-    effort = (arm_efforts(q, v, a) + random.normal(0, 0.03, q.shape))[late]
+    asked = arm_efforts(q, v, a)[late]
+    effort = asked + random.normal(0, 0.1, q.shape)
     path = tmp_path / 'run.csv'
-    np.savetxt(path, np.column_stack([q, measured, v, v[late], a, effort]), delimiter=',')
+    rows = np.column_stack([q, measured, v, v[late], a, asked, effort])
+    np.savetxt(path, rows, delimiter=',')
     (tmp_path / 'robot.urdf').write_text(ARM)
     first = first_model(tmp_path / 'robot.urdf', [path], tmp_path / 'robot.yaml', rate=100.0)
     found = read_recording(path, first.model.recorded)
@@ -170,6 +175,20 @@ def test_a_log_may_have_columns_of_words(tmp_path: Path) -> None:
                        np.full(len(time), 'elbow'), q, effort)
     np.testing.assert_allclose(found.position, q, atol=1e-6)
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+
+
+def test_times_that_are_repeated_are_no_positions(tmp_path: Path) -> None:
+    time, q, _, effort = run_of_arm()
+    with pytest.raises(GuessError, match='no names of columns say that they are positions'):
+        asked_about(tmp_path, 'Time,Force V,Time,Input V', time, effort[:, 0], time, q[:, 0],
+                    urdf=SLIDE)
+
+
+def test_velocities_in_radians_beside_positions_in_degrees_show_the_unit(tmp_path: Path) -> None:
+    time, q, v, _ = run_of_arm(2.0)
+    effort = np.tanh(20 * v) + np.random.default_rng(1).normal(0, 0.03, q.shape)
+    first = asked_about(tmp_path, '', time, np.degrees(q), v, effort)
+    assert 'position_scale: 0.01745' in str((first.questions, first.columns))
 
 
 @pytest.mark.parametrize(('speed', 'times', 'said'), [
@@ -209,8 +228,7 @@ def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = '
 def asked_about(folder: Path, head: str, *columns: np.ndarray, separator: str = ',',
                 urdf: str = ARM) -> FirstModel:
     """Write a table, and return the first model for it."""
-    cells = [column for group in columns for column in (
-        group.T if group.ndim == 2 else [group])]
+    cells = [column for group in columns for column in (group.T if group.ndim == 2 else [group])]
     lines = [separator.join(cell if isinstance(cell, str) else f'{cell:.10g}' for cell in row)
              for row in zip(*cells, strict=True)]
     (folder / 'run.csv').write_text('\n'.join([head] * bool(head) + lines))

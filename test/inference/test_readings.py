@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import made_up_arm
@@ -212,6 +213,9 @@ def test_degrees_from_another_zero_are_beyond_the_limits(tmp_path: Path) -> None
     time, q, _, effort = run(7)
     found = told(model, time, np.degrees(q + np.array([0, np.pi / 2])), effort)
     assert '-90 degrees (elbow) are to be added' in found.partition('look like degrees')[2]
+    found = told(model, time, q + np.array([-np.pi / 2, np.pi / 2]), effort)
+    assert {'90 degrees (shoulder)', '-90 degrees (elbow)'} <= {*re.findall(
+        r'-?90 degrees \(\w+\)', found)}
 
 
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:

@@ -217,7 +217,10 @@ def first_model(
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
                      'to drive them, list them with friction: {motors: …}')
     idle = [] if drives else [name for name in chosen if _moves_nothing(description, name)]
-    if idle and len(idle) < len(chosen):
+    if idle and len(idle) == len(chosen):
+        raise FirstModelError(f'{path}: no link that moves has an <inertial> with a mass, must '
+                              'have one: take a description of the robot with masses')
+    if idle:
         chosen = tuple(name for name in chosen if name not in idle)
         notes.append(f'{", ".join(idle)}: no link with an inertia moves about it, so that it is '
                      'not driven')
@@ -236,6 +239,7 @@ def first_model(
         except AmbiguousColumns as error:
             notes.append(str(error))
             draft.questions += error.lines
+            draft.kinds = {EFFORT}  # a line says which
         except GuessError as error:
             raise GuessError(f'{given[0]}: {error}') from None
         notes += draft.guessed
@@ -490,8 +494,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
             # Positions of joint states may have their efforts in arrays; else it is a table.
             if contents.joints and not contents.series:
                 raise
-        guess = guess_columns(contents.series, drives, others=movable, rate=rate,
-                              model=model)
+        guess = guess_columns(contents.series, drives, others=movable, rate=rate, model=model)
         kinds = {*(kind for _, kind in guess.columns), guess.effort_kind}
     if guess.time is not None:
         if guess.time not in TIME_COLUMNS:

@@ -9,7 +9,7 @@ is reported with the line that says so. Nothing is ever changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -184,9 +184,15 @@ class Search:
         self.rate = columns.rate if rate is None and columns is not None else rate
         # Recorded velocities over the derivatives of positions.
         self.factors = factors_of(excerpt.velocity, excerpt.motion.velocity)
+        self.velocity_scales = [model.recorded.columns_of(drive).velocity_scale
+                                for drive in model.drives]
         turning = [units.turns for units in model.units]
+        # Degrees are not in degrees again.
         self.rows = readings(model.drives, model.units, self._loads(), [*self._excerpts][1:],
-                             bool(np.all(recording.position[:, turning] % 1 == 0)))
+                             bool(np.all(recording.position[:, turning] % 1 == 0)),
+                             [d for d, drive in enumerate(model.drives) if abs(
+                                 model.recorded.columns_of(drive).position_scale)
+                              in table.POSITION_UNITS])
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any.
         self.cost_of_constants = table.COST['drive_constant'] - table.UNCHECKED * is_first
@@ -263,19 +269,28 @@ class Search:
         seed = None
         while self._top() is not seed:
             seed = self._top()
-            self.fits += [fit for row in (*self.rows[1:], *self.mounting(seed.reading),
-                                          *self._rates(seed.reading))
-                          if row.kind in tried and self._may_follow(row, seed.reading)
-                          for reading in self._after(row, seed.reading)
-                          for fit in self.fits_of(reading) if self._is_credible(row, fit)]
+            self._extend(seed, (*self.rows[1:], *self.mounting(seed.reading),
+                                *self._rates(seed.reading)), tried)
+            # Of two zeros that are off, one alone may explain little.
+            zeros = [fit for fit in self.fits if fit.reading.kinds == {'position_offset'}]
+            if seed is start and zeros:
+                self._extend(max(zeros, key=lambda fit: fit.score), self.rows[1:],
+                             tried & {'position_offset'})
         return self._top()
+
+    def _extend(self, seed: Fit, rows: Sequence[Reading], tried: Collection[str]) -> None:
+        """Add the fits of a reading with each row of some kinds."""
+        self.fits += [fit for row in rows
+                      if row.kind in tried and self._may_follow(row, seed.reading)
+                      for reading in self._after(row, seed.reading)
+                      for fit in self.fits_of(reading) if self._is_credible(row, fit)]
 
     def likely(self) -> list[Fit]:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
         best = self.best()
         if best.reading.is_plain or best.residual > table.GOOD_FIT:
             far = self.reach(self.start.reading) > table.FAR
-            if best.residual <= table.GOOD_FIT:
+            if best.residual <= table.GOOD_FIT and not self._against_velocities(best.reading):
                 # Angles that explain the efforts are in the right unit, whatever limits say.
                 far &= [not units.turns for units in self.model.units]
             units = [unit for row in self.rows if np.any(far) and row.kind == 'position_unit'
@@ -288,6 +303,11 @@ class Search:
                 self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))):
             return []
         rivals = self._rivals(best)
+        # Where inertia and weight show no sign, friction alone is not sure of one.
+        negated = [evidence.factor(d, best.reading.efforts[d])
+                   for d in np.flatnonzero(scales < 0).tolist()]
+        if negated and not np.any(np.isfinite(negated)):
+            rivals = rivals or self.fits[:1]
         return [best, *rivals] if not best.reading.is_plain or (self.is_first and rivals) else []
 
     def mounting(self, before: Reading) -> list[Reading]:
@@ -306,17 +326,23 @@ class Search:
         common = float(np.median(factors or [0.0]))
         if common <= 0 or not all(near(common, (factor,)) for factor in factors):
             return
-        units = [unit for unit in (1.0, *table.VELOCITY_UNITS) if unit > 0]
+        # Velocities may be in the unit of the positions, as they are read, or in one of their own.
+        scale = float(np.median([self.velocity_scales[d] for d in self.factors]))
+        units = {unit * scale: table.COST['velocity_unit'] * (unit != 1) for unit in (
+            1.0, *table.VELOCITY_UNITS) if unit > 0} | {1.0: 0.0}
         if self.rate is None:
-            units = [1.0] if not near(common, units) or near(common, (
-                *table.TIMES, *(1 / unit for unit in table.TIMES))) else []
-        for unit in units:
+            # Recorded times are right where positions in degrees or turns explain the factor.
+            known = [angle * unit for angle in (1.0, *table.ANGLES) for unit in units]
+            units = {1.0: 0.0} if not near(common, known) or near(common, (
+                *table.TIMES, *(1 / unit for unit in table.TIMES))) else {}
+        for unit, cost in units.items():
             if not near(common, (unit,)):
                 what = 'the times were in another unit' if self.rate is None else (
                     f'there were {float(f"{self.rate * common / unit:.3g}"):g} samples per second, '
                     f'not {self.rate:g}')
                 yield replace(
-                    self.rows[0], kind='rate', cost=table.COST['rate'], time_unit=unit / common,
+                    self.rows[0], kind='rate', cost=table.COST['rate'] + cost,
+                    time_unit=unit / common,
                     what=f'the recorded velocities are {factors[0]:.4g} times the derivatives of '
                     f'the positions, as if {what}')
 
@@ -398,8 +424,7 @@ class Search:
                        float(prior.max()), float(residual.min()), float(np.mean(prior)))
 
         def alone(d: int, scales: Sequence[float]) -> float:
-            return max((likelihood(d, scale).score - _cost([scale]), scale)
-                       for scale in scales)[1]
+            return max((likelihood(d, scale).score - _cost([scale]), scale) for scale in scales)[1]
 
         first = fit_of(np.ones(len(self.model.drives)), 0.0)
         fits = [first, *(fit_of(*row) for row in self._effort_rows(
@@ -520,7 +545,8 @@ class Search:
         # Velocities are in the unit of the positions, or in one of their own.
         return table.UNLIKE_VELOCITY * (not all(
             near(abs(factor * reading.time_unit), (1.0,), doubt) or near(
-                factor * reading.time_unit / reading.scale[d], (1.0, *table.VELOCITY_UNITS), doubt)
+                factor * reading.time_unit / reading.scale[d] / self.velocity_scales[d],
+                (1.0, *table.VELOCITY_UNITS), doubt)
             for d, (factor, doubt) in self.factors.items()))
 
 

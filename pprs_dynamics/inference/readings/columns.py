@@ -16,10 +16,11 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.check import Fit, Search
-from pprs_dynamics.inference.readings.findings import columns_line
+from pprs_dynamics.inference.readings.findings import columns_line, near
 from pprs_dynamics.inference.readings.links import (
     Layout,
     Links,
+    in_motion,
     layouts,
     measured,
     move_alike,
@@ -131,18 +132,31 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     GuessError
         Where positions of the joints cannot be found, or two readings are as likely.
     """
+    lengths = [len(item.values) for item in series]
+    others_long = [item for item in series if len(item.values) != max(lengths, key=lengths.count)]
+    series = [item for item in series if len(item.values) == max(lengths, key=lengths.count)]
     time, fraction, time_scale, notes = _time(series, rate is not None)
+    notes += [f'{item.title} has {len(item.values)} numbers, others have {len(series[0].values)}: '
+              'not used' for item in others_long]
     left = [item for item in series if time is None or item.column not in (time.column, fraction)]
-    # pandas numbers rows in a column without a title, as other programs do.
-    left = [item for item in left if item.title or not _rises(item.values)
-            or not _counts_rows(item.values)]
+    times = next((item.values for item in series if time and item.column == time.column),
+                 np.zeros(0))
+    # pandas numbers rows in a column without a title, as other programs do; programs that record
+    # channels apart repeat the times.
+    left = [item for item in left if not _rises(item.values) or not (
+        np.array_equal(item.values, times) or (not item.title and _counts_rows(item.values)))]
     if not left:
         raise GuessError('no column has numbers other than times, must be positions of the '
                          'joints in addition to times')
     if len(left) == 1 < len(joints) and not left[0].title:
         raise GuessError(
-            f'each line has one number, must have one for each of {len(joints)} joints: '
+            f'each line has one number, must have one for each of {len(joints)} joints '
+            f'({", ".join(joints)}; --drives names fewer): '
             f'`paste {"- " * len(joints)}< FILE > NEW` joins {len(joints)} lines to one')
+    if quantity and not left[0].title and len(left) < len(joints):
+        raise GuessError(f'{len(left)} columns of {quantity}s, must have one for each of '
+                         f'{len(joints)} joints ({", ".join(joints)}): give --drives '
+                         + ','.join(joints[:len(left)]))
     stamp: Columns = {('', key): column for key, column in (
         ('time', None if time is None else time.column), ('time_fraction', fraction))
         if column is not None}
@@ -164,10 +178,11 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
             item.column for item in titled if item.column not in columns.values()
             and fit_of_name(tuple(words_of(item.title)), {'': item.column}, EFFORT, None)[0] > 0])
     if not known:
+        example = next((item.column for item in left if may_be(item.title, main)), '…')
         raise GuessError(
             f'no names of columns say that they are {main}s: ' + ', '.join(
                 item.title or str(item.column) for item in left[:12])
-            + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {left[0].column}}}}}')
+            + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {example}}}}}')
     by_column = {item.column: item for item in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := scale_of(by_column[column].title, key[1])) is not None}
@@ -336,32 +351,43 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
     if not found:
         raise GuessError(
             f'there is no header, and {len(series)} columns without time are no blocks of {count} '
-            f'joints ({", ".join(joints)}): write columns: {{time: 1, {joints[0]}: '
-            '{position: 2, effort: …}} with numbers from 1')
+            f'joints ({", ".join(joints)}): give --drives with the joints that it has, or write '
+            f'columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} with numbers from 1')
 
     def read(blocks: Mapping[str, Sequence[int]]) -> Columns:
         return stamp | {(joint, kind): series[place].column for kind, places in blocks.items()
                         for joint, place in zip(joints, places, strict=False)}
 
     fits: list[tuple[Fit, Layout]] = []
-    most = -0.5 * table.SAMPLES * count * np.log(table.CLOSEST)
+    most = -0.5 * table.SAMPLES * np.log(table.CLOSEST)
     for layout in found:
         # No effort is explained better than completely.
-        if fits and layout.evidence + most < max(fit.score for fit, _ in fits) - table.SURE:
+        possible = layout.evidence + most * np.sum(in_motion(values, layout.blocks[POSITION]))
+        if fits and possible < max(fit.score for fit, _ in fits) - table.SURE:
             break
-        # Velocities say at which rate they are the derivatives.
-        rate = 1.0 if has_times or has_rate else layout.rate or 1.0
+        # Velocities say at which rate they are the derivatives, whichever is given.
+        rate = 1.0 if has_times or (has_rate and near(
+            abs(layout.rate), (1.0, *table.VELOCITY_UNITS))) else layout.rate or 1.0
         fits.append((_fit(model, values, time / rate, layout, None if has_times else 1.0), layout))
     fits.sort(key=lambda pair: -pair[0].score)
-    best, layout = fits[0]
-    rivals = [other for fit, other in fits if (
-        fit.score > best.score - table.SURE or best.residual > table.GOOD_FIT) and not all(
-            kind in other.blocks and kind in layout.blocks
-            and move_alike(values, layout.blocks[kind], other.blocks[kind])
-            for kind in (POSITION, EFFORT)) and other is not layout]
+    copies = [pair for pair in fits if _are_alike(values, pair[1], fits[0][1])]
+    # What was asked for has no noise, and is explained better than what was measured.
+    noise = [_noise(values[:, other.blocks.get(EFFORT, other.blocks[POSITION])])
+             for _, other in copies]
+    measured_one = max(range(len(copies)), key=lambda k: noise[k] > table.ROUGHER * noise[0])
+    best, layout = copies[measured_one]
+    used = [place for block in layout.blocks.values() for place in block]
+    unused = [place for place in range(len(series)) if place not in used]
+    # What a model explains as well may be the efforts, too; a thermometer is a constant.
+    rivals = [other for fit, other in fits if all(other is not copy for _, copy in copies) and (
+        fit.score > best.score - table.SURE or best.residual > table.GOOD_FIT or (
+            EFFORT in other.blocks and EFFORT in layout.blocks and fit.residual < table.EXPLAINED
+            and other.blocks[POSITION] == layout.blocks[POSITION]
+            and abs(other.evidence - layout.evidence) < table.SURE
+            and _varies(values[:, other.blocks[EFFORT]])))]
     if rivals:
         raise AmbiguousColumns(joints, [read(layout.blocks), read(rivals[0].blocks)],
-                               'two readings of the columns are as likely')
+                               'two readings of the columns are possible')
     if EFFORT not in layout.blocks or (best.least_residual < table.NO_EFFORT < best.largest_residual
                                        and not best.is_rigid):
         known = {kind: block for kind, block in layout.blocks.items() if kind != EFFORT}
@@ -375,13 +401,34 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
                 half, (item.column for item in series), strict=True))],
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
-    used = [place for block in layout.blocks.values() for place in block]
-    unused = [place for place in range(len(series)) if place not in used]
     taken = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
              for kind, places in layout.blocks.items()]
     notes.append(f'no {"name of a position" if is_titled else "header"}: ' + ', '.join(taken) + (
         f'; {_span(series, unused)} not used' if unused else ''))
     return {key: column for key, column in read(layout.blocks).items() if key not in stamp}
+
+
+def _noise(values: Array) -> float:
+    """Return the third differences of columns, (N, M), over their sizes, without single jumps."""
+    sizes = np.maximum(np.std(values, axis=0), 1e-300)
+    return float(np.median(np.abs(np.diff(values, 3, axis=0)) / sizes))
+
+
+def _varies(values: Array) -> bool:
+    """Return whether some of the columns, (N, M), is no constant with a little drift."""
+    return bool(np.any(np.std(values, axis=0) > table.STEADY * np.abs(np.mean(values, axis=0))))
+
+
+def _are_alike(values: Array, layout: Layout, other: Layout) -> bool:
+    """Return whether two layouts have positions and efforts that are alike."""
+    if layout is other or EFFORT not in layout.blocks or EFFORT not in other.blocks or (
+            not move_alike(values, layout.blocks[POSITION], other.blocks[POSITION])):
+        return layout is other
+    first, second = (values[:, each.blocks[EFFORT]] for each in (layout, other))
+    moving = np.any(np.diff(first, axis=0), axis=0) & np.any(np.diff(second, axis=0), axis=0)
+    return bool(np.any(moving)) and all(
+        np.corrcoef(first[:, k], second[:, k])[0, 1] > table.ALIKE
+        for k in np.flatnonzero(moving))
 
 
 def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: float | None) -> Fit:
@@ -413,10 +460,10 @@ def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: fl
 def _ask_for_one(joints: Sequence[str], known: Columns, efforts: Sequence[Column]) -> None:
     """Raise AmbiguousColumns: a column may be the effort of one joint, or of another."""
     if len(joints) > 1 and efforts:
-        raise AmbiguousColumns(joints, [known | {(joint, EFFORT): column} for column in efforts[:2]
-                                        for joint in joints],
-                               f'no {len(joints)} columns are efforts of {", ".join(joints)}; '
-                               f'column {efforts[0]} may be that of one joint')
+        raise AmbiguousColumns(
+            joints, [known | {(joint, EFFORT): efforts[0]} for joint in joints[:2]],
+            f'no {len(joints)} columns are efforts of {", ".join(joints)}; column {efforts[0]} may '
+            'be that of one joint')
 
 
 def _span(series: Sequence[Series], places: Sequence[int]) -> str:

@@ -164,8 +164,7 @@ class Evidence:
         misfit = 0.5 * ((found - mean) / width) ** 2
         # Masses are off by factors.
         misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
-        cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves])
-                     + np.sum(misfit[2:]))
+        cost = float(np.sum(np.minimum(misfit[:2], table.MASSES_MOST)[moves]) + np.sum(misfit[2:]))
         # Friction beyond some times the rigid body's forces is unlikely.
         friction, weight_of = (np.linalg.norm(force) + 1e-300 for force in (
             matrix[:, OTHERS:CONSTANT] @ found[OTHERS:CONSTANT], rigid.sum(axis=1)))
@@ -441,8 +440,7 @@ def effort_contents(model: DriveModel, recording: Recording, evidence: Evidence 
     """Return the shares of the efforts of drives that move and have enough samples."""
     if evidence is None:
         excerpt = excerpt_of(recording, table.STRETCHES)
-        evidence = None if excerpt is None else Evidence.of(
-            model, excerpt)
+        evidence = None if excerpt is None else Evidence.of(model, excerpt)
     if evidence is None:
         return {}
     moves = evidence.moves(model)

@@ -177,7 +177,8 @@ def find_other_velocities(model: DriveModel, factors: Mapping[int, tuple[float, 
         factor = once * time_unit
         doubt_of_one = max(doubt, table.NEAR_ONE)
         unit = near(factor, (1.0,), doubt_of_one) or near(
-            factor, (*table.VELOCITY_UNITS, *groups), doubt)
+            factor, (*table.VELOCITY_UNITS, *(1 / unit for unit in table.VELOCITY_UNITS), *groups),
+            doubt)
         groups.setdefault(unit or float(f'{factor:.4g}'), []).append(drive)
     drives = model.drives
     for factor, group in groups.items():

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.readings import table
@@ -111,8 +112,10 @@ def layouts(values: Array, time: Array, count: int) -> list[Layout]:
 def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterator[Layout]:
     """Yield which block may be the positions, and which other one, or none, the efforts."""
     numbers, moves = range(len(blocks)), np.any(np.diff(values, axis=0), axis=0)
+    moving = [in_motion(values, block) for block in blocks]
     # A block that is the derivative of another, or the same earlier or later.
-    rates = np.array([[_nats(links.correlation[i, j]) for j in blocks] for i in blocks])
+    rates = np.array([[_nats(links.correlation[i, j][first & second]) for j, second in zip(
+        blocks, moving, strict=True)] for i, first in zip(blocks, moving, strict=True)])
     alike = np.array([[move_alike(values, i, j) for j in blocks] for i in blocks])
     follows = np.where(alike, len(blocks[0]) * _nats(np.array([table.COPY])), rates)
 
@@ -122,7 +125,8 @@ def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterato
         return group[measured(values, [blocks[k] for k in group])]
 
     for q in numbers:
-        for effort in (None, *numbers) if best_of(q, numbers) == q else ():
+        for effort in (None, *numbers) if (
+                np.any(moving[q]) and best_of(q, numbers) == q) else ():
             if effort == q:
                 continue
             # The tree of the likeliest links from the positions to all that follows from them.
@@ -137,9 +141,11 @@ def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterato
                     max(known, key=lambda k: float(rates[q, k])), known)]
             if effort is not None:
                 found[table.EFFORT] = blocks[effort]
-            explained = [place for k in (*known, effort) if k is not None for place in blocks[k]]
+            explained = [*blocks[q], *(blocks[effort] if effort is not None else ()), *(
+                place for k in known for place in np.asarray(blocks[k])[moving[k] & moving[q]])]
             evidence -= table.MASSES_MOST * float(np.sum(np.delete(moves, explained)))
-            slopes = links.slope[found[table.POSITION], found.get(table.VELOCITY, blocks[q])]
+            slopes = links.slope[found[table.POSITION], found.get(table.VELOCITY, blocks[q])][
+                moving[q]]
             yield Layout(found, float(np.nanmedian(slopes)) if table.VELOCITY in found else 0.0,
                          evidence)
 
@@ -153,11 +159,19 @@ def _nats(correlation: Array) -> float:
         1 - np.maximum(moving, 0.0) ** 2, table.CLOSEST))))
 
 
+def in_motion(values: Array, block: Sequence[int]) -> NDArray[np.bool_]:
+    """Return which columns of a block, of one unit, move by more than the noise of a still one."""
+    spans = np.ptp(np.nan_to_num(values[:, block]), axis=0)
+    return np.asarray(spans > table.WEAK * spans.max())
+
+
 def move_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
     """Return whether some columns move as others do, perhaps earlier or later."""
-    return all(lag(values[:, first], values[:, second]) is not None or not (
-        np.any(np.diff(values[:, first])) or np.any(np.diff(values[:, second])))
-        for first, second in zip(block, other, strict=True))
+    first, second = in_motion(values, block), in_motion(values, other)
+    if not np.any(first & second):
+        return not np.any(first | second)
+    return all(lag(values[:, block[k]], values[:, other[k]]) is not None
+               for k in np.flatnonzero(first & second).tolist())
 
 
 def lag(values: Array, other: Array) -> int | None:
@@ -188,6 +202,10 @@ def measured(values: Array, blocks: Sequence[Sequence[int]]) -> int:
 
     That is the last one, or the one with noise: commands have none.
     """
+    moving = in_motion(values, blocks[0])
+    if np.any(moving):
+        blocks = [[place for place, moves in zip(block, moving, strict=True) if moves]
+                  for block in blocks]
     lags = [[lag(values[:, first], values[:, other]) for first, other in zip(
         blocks[0], block, strict=True)] for block in blocks]
     alike = [k for k, found in enumerate(lags) if k == 0 or None not in found]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 from typing import Any
@@ -31,6 +31,7 @@ ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns'}
 # Encoders, tried where all positions are whole numbers.
 COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
           for bits in (12, 10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
+POSITION_UNITS = frozenset((*LENGTHS, *ANGLES, *COUNTS))
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
@@ -70,7 +71,7 @@ FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
         'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
-        'drive_constant': 10.0, 'load': 1.0}
+        'drive_constant': 10.0, 'velocity_unit': 6.0, 'load': 1.0}
 # Loads at the tool, as shares of the mass that the robot moves.
 LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
@@ -200,13 +201,13 @@ SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
 # --------------------------------------------------------------------------------- velocities
 
 ALIKE = 0.9  # correlation of a velocity with the derivative of its position
-VELOCITY_UNITS = (-1.0, *(sign * factor for sign in (1, -1) for unit in (
-    math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6) for factor in (unit, 1 / unit)))
+# Recorded velocities over those in SI units.
+VELOCITY_UNITS = (-1.0, *(sign / unit for sign in (1, -1) for unit in (
+    math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6)))
 NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
 RATE_OFF = 0.03  # relative error of a sampling rate that is reported
 
 MOST_PERMUTED = 4  # drives of which all orders are tried
-MOST_TURNED = 3  # drives of which two zeros at a time are tried
 
 
 @dataclass(frozen=True)
@@ -290,7 +291,8 @@ class Reading:
 
 
 def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequence[float] = (),
-             times: Sequence[float] = (), are_counts: bool = False) -> list[Reading]:
+             times: Sequence[float] = (), are_counts: bool = False,
+             known: Collection[int] = ()) -> list[Reading]:
     """Return the table of readings of D drives: first the plain one, other orders last.
 
     Parameters
@@ -303,6 +305,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         Units in which times may be [s].
     are_counts : bool
         Whether all angles are whole numbers, as encoders count.
+    known : collection of int
+        Drives whose positions are read in a unit already.
     """
     every = tuple(range(len(drives)))
     same = np.arange(len(drives))
@@ -320,7 +324,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         add('load', '', (), load=load)
     angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for names, turns in ((LENGTHS, False), (angles, True)):
-        alike = tuple(k for k in every if units[k].turns == turns)
+        alike = tuple(k for k in every if units[k].turns == turns and k not in known)
         for unit, name in names.items():
             # Encoders of a robot's turning joints count alike.
             for group in _groups(drives, alike)[:1 if unit in COUNTS else None]:
@@ -341,15 +345,11 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     for group in _groups(drives, every):
         add('position_sign', f'the {_position(drives, group)} negated', group, ALL_NEGATED * (
             len(group) == len(every) > 1), scale=np.where(np.isin(same, group), -1.0, 1.0))
-    turned = [{k: turn} for k in every if units[k].turns for turn in QUARTERS]
-    if len(turned) <= MOST_TURNED * len(QUARTERS):  # two may be off together
-        turned += [first | second for first, second in combinations(turned, 2)
-                   if first.keys() != second.keys()]
-    for offsets in turned:
-        listed = ', '.join(f'{QUARTERS[turn]} degrees ({drives[k]})' for k, turn in offsets.items())
-        add('position_offset', f'the zero of {named(drives, (*offsets,))} looks off: {listed} are '
-            'to be added to its positions', (*offsets,), COST['position_offset'] * (
-                len(offsets) - 1), offset=np.array([offsets.get(k, 0.0) for k in every]))
+    for k in (k for k in every if units[k].turns):
+        for turn, angle in QUARTERS.items():
+            add('position_offset', f'the zero of {drives[k]} looks off: {angle} degrees '
+                f'({drives[k]}) are to be added to its positions', (k,),
+                offset=np.where(np.array(every) == k, turn, 0.0))
     for order in _orders(len(drives)):
         moved, other = tuple(k for k in every if order[k] != k), np.array(order)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)

@@ -188,7 +188,7 @@ def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
               if link.get('name') in carried and link.find('inertial') is None
               and link.find('collision') is not None]
     if hollow:
-        yield f'{_listed(hollow)} have a shape and no <inertial>: they weigh nothing here'
+        yield f'links with a shape and no <inertial>, which weigh nothing here: {_listed(hollow)}'
     rubbing = [joint.get('name', '') for joint in robot.findall('joint')
                if any(_number(joint.find('dynamics'), key, 0.0) for key in DYNAMICS)]
     if rubbing:
