@@ -178,8 +178,7 @@ class FeedforwardNode(ManagedNode):
             self._timing.check(request, now, _since(info['source_timestamp']))
             answer = self._feedforward.answer(request)
             # All that the node did not compute it stood still: suspended, or without a processor.
-            self._timing.check_pause(
-                time.perf_counter() - began - (time.process_time() - worked))
+            self._timing.check_pause(time.perf_counter() - began - (time.process_time() - worked))
         except PprsError as error:
             self._reject(Rejection.of(error))
             return
@@ -189,8 +188,7 @@ class FeedforwardNode(ManagedNode):
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
         # Without a clock nothing can be said of a stamp, and a wait for it would not end.
-        self._watchdog.feed(
-            request.end - (self.get_clock().now().nanoseconds or request.start))
+        self._watchdog.feed(request.end - (self.get_clock().now().nanoseconds or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
             waited = _since(info['received_timestamp']) - (time.perf_counter() - began)

@@ -386,8 +386,7 @@ class Feedforward:
         now = (int(last.request.offsets[-1]) - left) / NANOSECONDS
         path = _path_of(last).stop(now, duration)
         lower, upper = self._limits.lower, self._limits.upper
-        motion = JointMotion(
-            np.clip(path.position, lower, upper), path.velocity, path.acceleration)
+        motion = JointMotion(np.clip(path.position, lower, upper), path.velocity, path.acceleration)
         forces = self._model.sound_at(motion).drive_forces(motion)
         assert path.time is not None  # `stop` gives it
         return DriveTrajectory(

@@ -96,8 +96,7 @@ class LiveJointStates(Node):
         if not self.owner.is_there:
             return ''
         name, status = self.owner.name, self.owner.status
-        full_name = name if name.startswith('/') else (
-            f'{self.get_namespace().rstrip("/")}/{name}')
+        full_name = name if name.startswith('/') else (f'{self.get_namespace().rstrip("/")}/{name}')
         parts = [f'node {full_name}']
         if status.robot:
             parts.append(f'robot {status.robot}'

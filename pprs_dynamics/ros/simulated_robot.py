@@ -90,8 +90,7 @@ class SimulatedRobotNode(Node):
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
         self._late_before, self._cycles_before = 0, 0
         # Hidden effects are in the log only, and on no topic.
-        self._status = StatusReporter(
-            self, self._counters, f'simulated {hardware_of(self._model)}')
+        self._status = StatusReporter(self, self._counters, f'simulated {hardware_of(self._model)}')
         self._states = publisher(self, JointState, 'joint_states')
         for kind, topic, take in ((JointState, '~/joint_command', self._take_setpoint),
                                   (Float64MultiArray, '~/commands', self._take_efforts)):

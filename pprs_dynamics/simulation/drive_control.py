@@ -106,8 +106,7 @@ class DriveControl:
         self.settings, self._limits, self._weight = settings, limits, weight
         self._smoothing = smoothing
         count = len(limits.drives)
-        self._delay_line: deque[Array] = deque(
-            maxlen=1 + round(settings.actuation_delay / step))
+        self._delay_line: deque[Array] = deque(maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
         self._at_limit = np.zeros(count, dtype=bool)
         self._nothing = np.zeros(count)

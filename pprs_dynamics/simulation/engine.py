@@ -130,8 +130,7 @@ class MechanismEngine:
         mujoco.mj_setConst(self.model, self.data)
         with source_of_errors(model.source):
             self._require_agreement(model)
-        self._described = self.gravity, {
-            name: getattr(self.model, name).copy() for name in CHANGED}
+        self._described = self.gravity, {name: getattr(self.model, name).copy() for name in CHANGED}
 
     def reset(self) -> None:
         """Restore bodies, gravity and wrench of the description."""

@@ -81,8 +81,7 @@ class MechanismRun:
     channels: Mapping[str, Array]
 
 
-def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RATE,
-                ) -> JointMotion:
+def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RATE) -> JointMotion:
     """Return a random Fourier series of all drives within their limits and the workspace.
 
     It begins and ends at rest, in the middle of the drives' room; see `Structure.room`.
@@ -743,8 +742,7 @@ def _coupled_drives(run: Injection) -> Injected:
 
 
 def _effort_gain(run: Injection) -> Injected:
-    joint, gain = run.sizes(
-        lambda: {'joint': run.joint(), 'gain': run.size(0.04, 0.1)}).values()
+    joint, gain = run.sizes(lambda: {'joint': run.joint(), 'gain': run.size(0.04, 0.1)}).values()
     run.efforts[:, joint] *= 1 + gain
     return [run.model.drives[joint]], {'gain': gain}
 
@@ -786,8 +784,7 @@ def _effort_filter(run: Injection) -> Injected:
     """Inject a Butterworth low-pass of second order, T = sqrt(2) / (2 pi f_c)."""
     from scipy.signal import butter, lfilter, lfilter_zi
 
-    time_constant = run.sizes(
-        lambda: {'time_constant': run.size(0.01, 0.04)})['time_constant']
+    time_constant = run.sizes(lambda: {'time_constant': run.size(0.01, 0.04)})['time_constant']
     rate = 1 / float(np.median(np.diff(run.time)))
     highest = 0.45 * rate  # no samples show what is faster
     b, a = butter(2, min(np.sqrt(2) / (2 * np.pi * time_constant), highest), fs=rate)

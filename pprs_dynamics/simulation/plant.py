@@ -229,8 +229,7 @@ class Plant(Injecting):
         """
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
-        self.engine.closed(JointMotion(self.position[None], self.velocity[None],
-                                       self._rest[None]))
+        self.engine.closed(JointMotion(self.position[None], self.velocity[None], self._rest[None]))
         self.last_acceleration = np.zeros_like(self.position)
         self._held = self._rest
         self._held = self.holding(self.position) - self._offset
@@ -296,8 +295,7 @@ class Plant(Injecting):
         Friction is relative rates per rate of drives (K, 3, D) and a law, which gives friction over
         rate, (K,), of rates (K, 3).
         """
-        closed = self.engine.closed(JointMotion(
-            position[None], velocity[None], acceleration[None]))
+        closed = self.engine.closed(JointMotion(position[None], velocity[None], acceleration[None]))
         carried = self.engine.carried(closed)
         T = closed.rates[0]
         mass = T.T @ self.engine.inertia() @ T

@@ -93,8 +93,7 @@ class Sensors:
     def measure(self, time: float, effort: Array) -> Measurement:
         """Return the readings to publish now, of efforts (D,) with noise."""
         white, new = self._rng.standard_normal((2, len(effort)))
-        self._correlated = (CORRELATION * self._correlated
-                            + np.sqrt(1 - CORRELATION ** 2) * new)
+        self._correlated = (CORRELATION * self._correlated + np.sqrt(1 - CORRELATION ** 2) * new)
         noise = np.sqrt(1 - CORRELATED) * white + np.sqrt(CORRELATED) * self._correlated
         return Measurement(time, self.position.copy(), self.velocity.copy(),
                            effort + self._noise * noise)

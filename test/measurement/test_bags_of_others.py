@@ -132,8 +132,7 @@ def test_a_packed_storage_file_alone_is_read(tmp_path: Path) -> None:
 def test_currents_of_hardware_interfaces_become_efforts(
     interface: str, scale: float, tmp_path: Path,
 ) -> None:
-    path = ros2(tmp_path / 'bag', lambda k: {
-        '/dynamic_joint_states': currents(k, interface)})
+    path = ros2(tmp_path / 'bag', lambda k: {'/dynamic_joint_states': currents(k, interface)})
     assert_read(read(path), scale)
 
 

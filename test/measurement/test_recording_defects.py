@@ -379,8 +379,7 @@ def test_a_few_damaged_rows_are_discarded_and_counted(rows: Any, value: float) -
     damaged = position.copy(), effort.copy()
     for values in damaged:
         values[rows] = value
-    recording = Recording.from_arrays('log', time, damaged[0], effort=damaged[1],
-                                      drives=('a', 'b'))
+    recording = Recording.from_arrays('log', time, damaged[0], effort=damaged[1], drives=('a', 'b'))
     kept = np.ones(len(time), dtype=bool)
     kept[rows] = False
     np.testing.assert_array_equal(recording.position, position[kept])

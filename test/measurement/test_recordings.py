@@ -118,9 +118,7 @@ def test_drives_are_found_by_name_among_other_joints_in_any_order(tmp_path: Path
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), orders=st.integers(1, 40), big_endian=st.booleans())
-def test_collected_messages_agree_with_rosbags(
-    seed: int, orders: int, big_endian: bool,
-) -> None:
+def test_collected_messages_agree_with_rosbags(seed: int, orders: int, big_endian: bool) -> None:
     # Any number of joints and orders, sequences that are absent, names of any length.
     shuffle = random.Random(seed)
     joints = [*DRIVES, *('x' * k for k in range(1, shuffle.randint(1, 5)))]

@@ -51,8 +51,7 @@ def rod_ends(geometry, motion):
     if geometry.elbow == 'down':
         rise = -rise
     along = np.einsum('nij,ij->ni', A, n)
-    C = (geometry.base_radius * e + along[..., None] * n
-         + (A[..., 2] - rise)[..., None] * UP)
+    C = (geometry.base_radius * e + along[..., None] * n + (A[..., 2] - rise)[..., None] * UP)
     # The rod keeps its length: (A - C) . (v_A - v_C) = 0 gives the lift's velocity.
     v_C = np.einsum('nij,ij->ni', v_A, n)[..., None] * n
     rod = A - C

@@ -229,8 +229,7 @@ def test_force_is_the_sum_of_coefficients_times_columns(effect):
 def test_any_coefficients_fitted_make_an_allowed_effect_of_the_same_force(effect, data):
     fitted = {c.name: data.draw(st.sampled_from((0.0, 1e-9, -1e-9)) | st.floats(-100, 100))
               for c in effect.coefficients}
-    values = {**effect.from_coefficients(fitted),
-              **{p.name: p.scale for p in effect.shape}}
+    values = {**effect.from_coefficients(fitted), **{p.name: p.scale for p in effect.shape}}
     assert effect.from_file(on_axis(values)).drives == {'axis': values}
     axes = excitation(2.0)
     columns = effect.columns(DriveSamples.of(axes, 0), **{p.name: p.scale for p in effect.shape})

@@ -44,8 +44,7 @@ def motion(robot):
 def loads_of_joints(robot, forces):
     """Return what the tree of the robot's joints and closures transmits."""
     s = forces.mechanism
-    return robot.at(s.position, s.velocity, s.acceleration).loads(
-        robot.by_joint, robot.gravity_row)
+    return robot.at(s.position, s.velocity, s.acceleration).loads(robot.by_joint, robot.gravity_row)
 
 
 def rod_cosines(robot, motion):

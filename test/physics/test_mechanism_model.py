@@ -65,8 +65,7 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
     effect = PayloadMass.bound(model.robot).from_file(values)
     motion = states()
     state = effect.apply(model.mechanism(motion))
-    assert state.rigid_force == pytest.approx(
-        mujoco_torques(arm.urdf(more=body), motion), abs=1e-9)
+    assert state.rigid_force == pytest.approx(mujoco_torques(arm.urdf(more=body), motion), abs=1e-9)
 
 
 def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:

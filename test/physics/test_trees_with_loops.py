@@ -81,8 +81,7 @@ STEPS = 60
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 2 ** 32 - 1))
 @pytest.mark.parametrize('name', ['delta', 'five_bar'])
-def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str, seed: int,
-                                                      ) -> None:
+def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str, seed: int) -> None:
     """Poses anywhere and a little apart: with a state as without, wherever there is an answer."""
     random = np.random.default_rng(seed)
     model = DriveModel.load(ROBOTS[name]().write(tmp_path))
@@ -207,8 +206,7 @@ def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_p
     model = DriveModel.load(four_bar(0.3).write(tmp_path))
     moved = model.mechanism(JointMotion(turn, rest, rest)).links
     ends = [moved.frame_of(link) for link in ('rod', 'rocker')]
-    tips = [end.p + end.R @ np.array([x, 0, 0])
-            for end, x in zip(ends, (0.3, 0.2), strict=True)]
+    tips = [end.p + end.R @ np.array([x, 0, 0]) for end, x in zip(ends, (0.3, 0.2), strict=True)]
     assert tips[0] == pytest.approx(tips[1], abs=1e-9)
 
 

@@ -73,8 +73,7 @@ def test_a_stop_after_a_slow_answer_holds_the_pose_of_the_present_time(
     times = np.arange(1.0, 4.0, 0.01)
     motion = HelicalPath().motion(times)
     model = DriveModel.load()
-    efforts = model.drive_forces(
-        PlatformMotion.at_rest(motion.position, motion.orientation)).total
+    efforts = model.drive_forces(PlatformMotion.at_rest(motion.position, motion.orientation)).total
 
     def slow(model: DriveModel, *arguments: object) -> object:
         time.sleep(0.6)

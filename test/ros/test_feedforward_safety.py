@@ -217,8 +217,7 @@ def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
     with feedforward_bench() as node:
         for _ in range(20):
             node.answer(message_of(MOTION))
-        assert node.bench.spin_until(
-            lambda: node.bench.status[-1]['counters']['accepted'] == 20)
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['counters']['accepted'] == 20)
         status = node.bench.status[-1]
         assert status['state'] == 'active'
         assert 0 < status['compute_time']['p50'] <= status['compute_time']['p99']
@@ -228,8 +227,7 @@ def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
         assert status['model']['files'][0]['file'].endswith('config/paper.yaml')
         before = status['model']['sha256']
         node.node.set_parameters([Parameter('masses.payload', value=1.5)])
-        assert node.bench.spin_until(
-            lambda: node.bench.status[-1]['model']['sha256'] != before)
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['model']['sha256'] != before)
 
 
 def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not() -> None:

@@ -89,8 +89,7 @@ def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
     node.use(MODEL, own)
     np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)
     clock.now += 2.0
-    np.testing.assert_array_equal(
-        node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
+    np.testing.assert_array_equal(node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
 
 
 @pytest.mark.parametrize(('before', 'after'), [(MODEL, HEAVY), (HEAVY, MODEL)])
@@ -160,8 +159,7 @@ def test_of_a_piece_the_first_point_is_remembered_and_what_is_foreseen_is_not() 
         begin = start + k * STEP
         piece, point = (TrajectoryRequest(request(1.0 + 0.01 * k, count).motion, begin,
                                           STEP * np.arange(count)) for count in (6, 1))
-        np.testing.assert_array_equal(pieces.answer(piece).effort[:1],
-                                      points.answer(point).effort)
+        np.testing.assert_array_equal(pieces.answer(piece).effort[:1], points.answer(point).effort)
 
 
 @pytest.mark.parametrize('moment', [0.0, 1.3, 3.0])
@@ -225,8 +223,7 @@ def test_a_pose_beyond_a_stroke_is_refused() -> None:
     (Timing(max_age=0.1), -0.2), (Timing(max_ahead=0.1), 0.2), (Timing(max_duration=0.01), 0.0)])
 def test_what_is_too_old_too_early_or_too_long_is_refused(timing: Timing, start: float) -> None:
     now = 5_000_000_000
-    asked = TrajectoryRequest(request(1.0, 3).motion, now + round(1e9 * start),
-                              STEP * np.arange(3))
+    asked = TrajectoryRequest(request(1.0, 3).motion, now + round(1e9 * start), STEP * np.arange(3))
     with pytest.raises(Rejection, match=timing._fields[np.flatnonzero(timing)[0]]):
         timing.check(asked, now)
     Timing(*(10.0 * value for value in timing)).check(asked, now)

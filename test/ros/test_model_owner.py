@@ -83,8 +83,7 @@ def cell(ros_domain: int) -> Iterator[Cell]:
 def test_a_model_is_set_followed_and_restored(cell: Cell) -> None:
     live = cell.live
     assert not live.to_dict()['can_restore']
-    assert live.set_model(HEAVIER, live.machine()) == {
-        'is_set': True, 'nodes': {'feedforward': ''}}
+    assert live.set_model(HEAVIER, live.machine()) == {'is_set': True, 'nodes': {'feedforward': ''}}
     awaited(lambda: cell.models() == [SET, SET])
     assert live.to_dict()['effects'] == ['effort_offset']
     awaited(lambda: live.to_dict()['can_restore'])

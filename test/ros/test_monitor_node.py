@@ -90,8 +90,7 @@ def test_an_effort_that_is_not_a_number_is_no_measurement(monitor: MonitorBench)
 
 def status_of(sha256: str) -> str:
     """Return what a node that drives says of itself and its model."""
-    return json.dumps({
-        'robot': '3-PPRS', 'model': {'files': [], 'sha256': sha256}, 'changes': 0})
+    return json.dumps({'robot': '3-PPRS', 'model': {'files': [], 'sha256': sha256}, 'changes': 0})
 
 
 def test_a_feedforward_of_another_model_is_told(monitor: MonitorBench) -> None:

@@ -44,8 +44,7 @@ class FeedforwardBench:
         self.joint_command = bench.listen(JointState, '/feedforward/joint_command')
         self.joint_trajectory = bench.listen(JointTrajectory, '/feedforward/joint_trajectory')
         bench.follow_status('/feedforward/status')
-        self.publisher = bench.probe.create_publisher(
-            message, f'/feedforward/{topic}', 100)
+        self.publisher = bench.probe.create_publisher(message, f'/feedforward/{topic}', 100)
 
     def connect(self) -> FeedforwardBench:
         """Wait until node and probe see each other on every topic."""

@@ -67,8 +67,7 @@ def real_arm(folder: Path, **changes: Any) -> DriveModel:
     return real
 
 
-def record(model: DriveModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
-           ) -> Recording:
+def record(model: DriveModel, moved: JointMotion, noise: float = 0.2, seed: int = 0) -> Recording:
     """Return what a recording of the arm would hold, with white noise of the efforts."""
     forces = model.measured(model.drive_forces(moved))
     random = np.random.default_rng(100 + seed)

@@ -36,8 +36,7 @@ def pprs(
     encoding: str = 'utf-8',
 ) -> Ended:
     """Call `pprs` on a terminal so wide; what would be a traceback on the screen is raised."""
-    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline='')
-                for _ in range(2))
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline='') for _ in range(2))
     with chdir(cwd) if cwd else nullcontext(), as_a_new_process(columns), \
             redirect_stdout(out), redirect_stderr(err):
         try:

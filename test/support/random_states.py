@@ -117,8 +117,7 @@ def smooth_motion(t: Any, elbow: str = 'up') -> PlatformMotion:
                + (a_dot * b_dot)[:, None] * np.cross(z, y))
     turn = Rotation.from_rotvec(a[:, None] * [0, 0, 1]) * Rotation.from_rotvec(
         b[:, None] * [0, 1, 0])
-    return PlatformMotion(home_position(elbow) + x, turn.as_quat(), v, omega, acc, epsilon,
-                          t)
+    return PlatformMotion(home_position(elbow) + x, turn.as_quat(), v, omega, acc, epsilon, t)
 
 
 def robot_keys(robot: ThreePprs) -> dict[str, Any]:

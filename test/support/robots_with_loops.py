@@ -49,8 +49,7 @@ class RobotText:
     def joint(self, name: str, kind: str, parent: str, child: str, xyz: Any = (0, 0, 0),
               axis: Any = (0, 0, 1), limit: Any = NO_LIMIT, more: str = '') -> None:
         """Add a joint."""
-        moves = '' if kind in ('fixed', 'floating') else (
-            f'\n    <axis xyz="{words(axis)}"/>')
+        moves = '' if kind in ('fixed', 'floating') else (f'\n    <axis xyz="{words(axis)}"/>')
         if kind in ('revolute', 'prismatic'):
             lower, upper, speed, effort = limit
             moves += (f'\n    <limit lower="{lower:g}" upper="{upper:g}" velocity="{speed:g}" '

@@ -178,8 +178,7 @@ class AdoptionResult(Result):
                 self.inputs.files, model=saved_as).command('diagnose', held_out=True))
         page.bullets(answer.remarks)
         if rows := parameter_rows(answer):
-            page.table(('drive', 'values ± two standard deviations'), rows,
-                       caption='Fitted values')
+            page.table(('drive', 'values ± two standard deviations'), rows, caption='Fitted values')
         forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
                   if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
         if any(np.any(force) for force in forces.values()):

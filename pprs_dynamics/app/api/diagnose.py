@@ -220,8 +220,7 @@ def diagnosis_page(
     _unexplained(page, diagnosis, words)
     if diagnosis.effects:
         with page.fold('Contribution of each effect'):
-            page.table(HEADINGS, effect_rows(diagnosis),
-                       caption=CAPTION)
+            page.table(HEADINGS, effect_rows(diagnosis), caption=CAPTION)
             figures.add_contributions(page, diagnosis.residuals, {
                 effect.name: effect.force for effect in diagnosis.effects},
                 'Contribution of each effect.')

@@ -280,8 +280,7 @@ def read_checked(model: DriveModel, path: File, topic: str | None = None,
     return with_mistakes(model, _read(model, path, topic, progress))
 
 
-def _read(model: DriveModel, path: File, topic: str | None, progress: Progress | None,
-          ) -> Recording:
+def _read(model: DriveModel, path: File, topic: str | None, progress: Progress | None) -> Recording:
     report = stage(progress, f'reading {displayed(path)}')
     return read_recording(path, model.recorded, topic,
                           lambda done, total: report(done / total if total else 0.0))

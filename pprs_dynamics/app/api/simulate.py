@@ -93,8 +93,7 @@ class SimulationResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
-        return plot_over_time(self.recording.time,
-                              recording_rows(self.recording, self.model.units))
+        return plot_over_time(self.recording.time, recording_rows(self.recording, self.model.units))
 
 
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,

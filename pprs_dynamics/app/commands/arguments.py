@@ -36,8 +36,7 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
-INPUTS = ('model', 'recordings', 'validate', 'reference', 'file', 'manifest', 'store',
-          'path')
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'file', 'manifest', 'store', 'path')
 NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
          'store': 'the store'}
 

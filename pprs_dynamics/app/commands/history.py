@@ -46,8 +46,7 @@ def run(options: argparse.Namespace) -> int:
     model = DriveModel.load(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:
-        print(f'pprs history: {options.file} has no step to undo',
-              file=sys.stderr)
+        print(f'pprs history: {options.file} has no step to undo', file=sys.stderr)
         return 1
     screen.print(history_view(steps, unit))
     if options.json:

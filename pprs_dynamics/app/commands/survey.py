@@ -154,8 +154,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', metavar='N', type=whole(1, MOST_WORKERS),
                        help='processes on this machine (default: one for every core)')
-    where.add_argument('--scheduler', metavar='tcp://HOST:PORT',
-                       help='use a running Dask cluster')
+    where.add_argument('--scheduler', metavar='tcp://HOST:PORT', help='use a running Dask cluster')
 
 
 def run(options: argparse.Namespace) -> int:

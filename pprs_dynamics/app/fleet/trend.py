@@ -136,8 +136,7 @@ def fleet_trends(store: str) -> FleetTrends:
     rows = read_rows(store)
     refused = rows[rows.error.notna()]
     rows = rows[rows.error.isna()]
-    errors = rows[rows.effect.isna()].assign(
-        parameter='rms', value=rows.rms, unit='')
+    errors = rows[rows.effect.isna()].assign(parameter='rms', value=rows.rms, unit='')
     values = pandas().concat([rows[rows.effect.notna()], errors]).dropna(subset='value')
     values = values.fillna({'drive': '', 'effect': '', 'parameter': '', 'unit': ''})
     times = {key: group.groupby('sha256').time.first()

@@ -346,8 +346,7 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     unit = _power(residuals.units_of(statement.drive).effort)
     # Drawn whichever drive the page's menu shows.
     spectra = [trace.update(meta=None) for trace in _spectra(residuals, statement.drive, noise)]
-    figure = _over_frequency(spectra, 300,
-                             f'{what}<br>on {statement.drive} [{unit}]')
+    figure = _over_frequency(spectra, 300, f'{what}<br>on {statement.drive} [{unit}]')
     if statement.range is not None:
         figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
                          fillcolor=charts.MARK, opacity=0.3, line_width=0)

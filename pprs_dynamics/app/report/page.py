@@ -138,8 +138,7 @@ class Page:
             body.append(f'<tr>{"".join(cells)}</tr>')
         self._table('', caption, headings, body)
 
-    def _table(self, kind: str, caption: str, headings: Iterable[str], rows: Iterable[str],
-               ) -> None:
+    def _table(self, kind: str, caption: str, headings: Iterable[str], rows: Iterable[str]) -> None:
         head = ''.join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
         title = f'<caption><span>{escape(caption)}</span></caption>' if caption else ''
         self._body.append(f'<div class="scroll"><table{kind}>{title}<thead><tr>{head}</tr></thead>'

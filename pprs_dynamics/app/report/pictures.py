@@ -145,8 +145,7 @@ def draw_figure_9(path: str | PathLike[str], result: Reproduction) -> Path:
                label=r'$\Delta Q_1^p$: passive joints, second approach')
     upper.set(ylabel='additional force [N]',
               title='Additional force of motor 1 (the paper\'s figure 9)')
-    lower.plot(result.time, np.degrees(result.rod_angle),
-               label=['$u_1$', '$u_2$', '$u_3$'])
+    lower.plot(result.time, np.degrees(result.rod_angle), label=['$u_1$', '$u_2$', '$u_3$'])
     lower.axhline(90, color=GREY, lw=0.8)
     lower.set(xlabel='time [s]', ylabel='rod angle [degrees]',
               title='At 90 degrees the second approach is not defined: gaps in its curve')

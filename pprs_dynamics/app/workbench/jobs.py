@@ -243,8 +243,7 @@ class Jobs:
 def _diagnosed(model: DriveModel, recordings: Sequence[Recording], reference: Reference | None,
                progress: Progress) -> Diagnosis:
     """Return a diagnosis without its searches, which are large."""
-    return replace(diagnose(model, recordings, (), progress, reference=reference),
-                   selection=None)
+    return replace(diagnose(model, recordings, (), progress, reference=reference), selection=None)
 
 
 def _designed(model: DriveModel, recordings: Sequence[Recording], duration: float,

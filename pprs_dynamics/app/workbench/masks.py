@@ -29,8 +29,7 @@ SHORT = 5  # samples between two spans that count as one
 MOST_POSES = 600  # of the robot in motion
 
 
-def span_mask(ticks: Ticks, start: float, end: float, drives: Sequence[str] | None = None,
-              ) -> Mask:
+def span_mask(ticks: Ticks, start: float, end: float, drives: Sequence[str] | None = None) -> Mask:
     """Return the samples between two times [s], on some drives or all."""
     time = ticks.fits.design.residuals.time
     return ((time >= start) & (time <= end))[:, None] & _on(ticks, drives)
@@ -67,8 +66,7 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
         For an unknown name.
     """
     data = fits.design.residuals
-    table = {'measured': fits.measured, 'error before': fits.before,
-             'error now': view.residual}
+    table = {'measured': fits.measured, 'error before': fits.before, 'error now': view.residual}
     found = table[name][:, drive] if name in table else data.variable(name, drive)
     if found is None:
         raise ResidualsError('variable', f'{name!r} is not known',

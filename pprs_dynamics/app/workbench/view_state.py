@@ -123,8 +123,7 @@ class ViewState:
     @property
     def is_approximate(self) -> bool:
         """True where an effect is nonlinear and nothing exact is known yet."""
-        return self.stage != EXACT and any(
-            tick.effect.nonlinear for tick in self.ticks.values())
+        return self.stage != EXACT and any(tick.effect.nonlinear for tick in self.ticks.values())
 
 
 def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision: int) -> ViewState:
@@ -264,8 +263,7 @@ def recordings_to_dict(recordings: Mapping[str, Recording], fits: TickFits, now:
     return found
 
 
-def errors_of(fits: TickFits, view: ViewState, noise: Mapping[str, float],
-              ) -> dict[str, DriveError]:
+def errors_of(fits: TickFits, view: ViewState, noise: Mapping[str, float]) -> dict[str, DriveError]:
     """Return the errors of the measured drives."""
     return {name: DriveError(root_mean_square(fits.before[:, d]),
                              root_mean_square(view.residual[:, d]), noise.get(name, NOT_KNOWN))

@@ -228,8 +228,7 @@ class Information:
         for d, rows in self.columns(design):
             if d in self.noise:
                 series = regression.series[d]
-                white = series.transform(rows) * series.spread(
-                    np.sqrt(regression.weights(fit, d)))
+                white = series.transform(rows) * series.spread(np.sqrt(regression.weights(fit, d)))
                 gram += white @ white.T
         return gram
 
@@ -386,8 +385,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
         certain = information.force(terms[refitted])
         certain[list(free)] = 0.0
         rival = chosen[max(refitted, true) - 1]
-        sides = ((rival.missing, rival.instead) if true == 0
-                 else (rival.instead, rival.missing))
+        sides = ((rival.missing, rival.instead) if true == 0 else (rival.instead, rival.missing))
         contests.append(Contest(
             information.force(terms[true]) - certain, (*range(len(information.base)), *free),
             *sides, rows[refitted].cost - rows[true].cost))
@@ -408,8 +406,7 @@ def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm
         for d in sorted(theirs - set(c.drives)))
 
 
-def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: Motions,
-                  ) -> Question:
+def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: Motions) -> Question:
     """Return the question of a robot that nothing, or little, is known of.
 
     It is of the model's own numbers, and of the effects that are common.

@@ -454,8 +454,7 @@ def _features(processes: Processes, q: Array, v: Array, period: float) -> list[l
 
 
 def _base_columns(columns: Array, drives: Sequence[int]) -> list[BaseColumn]:
-    return [BaseColumn({d: columns[:, d, p] for d in drives}, 1.0)
-            for p in range(columns.shape[2])]
+    return [BaseColumn({d: columns[:, d, p] for d in drives}, 1.0) for p in range(columns.shape[2])]
 
 
 def _columns_of(d: int, features: Sequence[Array], size: Array) -> list[BaseColumn]:

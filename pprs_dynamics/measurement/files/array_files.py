@@ -188,8 +188,7 @@ def _labels(names: Any) -> list[str]:
     return [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
 
 
-def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[str]],
-             ) -> ArrayTable:
+def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[str]]) -> ArrayTable:
     parquet = optional_library('pyarrow.parquet', 'pyarrow', 'reading Parquet files', 'tables')
 
     def load(wanted: Sequence[str]) -> Mapping[str, Any]:

@@ -114,8 +114,7 @@ def _samples(path: Path, recorded: RecordedDrives, states: States,
             + (', '.join(sorted(names)[:MOST]) or 'no names')
             + f'; {missing_names(joints, names, path.name[:40])}')
     stamps, columns, are_whole = states.together(signals)
-    positions = [columns.get((joint, 'position'), np.full(len(stamps), np.nan))
-                 for joint in joints]
+    positions = [columns.get((joint, 'position'), np.full(len(stamps), np.nan)) for joint in joints]
     kept = np.full(len(stamps), are_whole) | np.isfinite(positions).all(axis=0)
     if not np.any(kept):
         raise UnreadableFileError(path, f'{topics} contains no positions of all of '
@@ -280,8 +279,7 @@ def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connec
         named = [name for name in measured if name.endswith(TOPIC_END)]
         whole = [name for name in measured if not any(word in name.lower() for word in COMMANDS)
                  and _has_efforts(bag, topics[name], drives)] if len(measured) > 1 else []
-        matching = whole if len(whole) == 1 else [
-            name for name in named if name in whole] or named
+        matching = whole if len(whole) == 1 else [name for name in named if name in whole] or named
         # Topics that were announced and stayed silent are no choice.
         matching = [name for name in matching
                     if any(item.msgcount for item in topics[name])] or matching

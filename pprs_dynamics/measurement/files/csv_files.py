@@ -206,8 +206,7 @@ class CsvTable:
         """Return the title of a column."""
         return self.names[place] if self.names else str(place + 1)
 
-    def _numbers(self, lines: list[str], start: int, used: Sequence[int], dates: set[int],
-                 ) -> Array:
+    def _numbers(self, lines: list[str], start: int, used: Sequence[int], dates: set[int]) -> Array:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
 

@@ -92,8 +92,7 @@ class Judgement:
         time = self.samples.time
         spans = tuple((float(time[first]), float(time[last])) for first, last in places)
         where = f' {when(spans)}' if spans else ''
-        self.findings.append(
-            Defect(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
+        self.findings.append(Defect(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
 
     def _tell_samples(self, kind: str, mask: Mask, what: str, drives: Iterable[str] = (),
                       noun: str = 'sample') -> None:
@@ -318,8 +317,7 @@ class Judgement:
             self.segments = tuple(parts)
             return
         short = [part for part in parts if part.stop - part.start < SHORTEST_SEGMENT]
-        self.segments = tuple(
-            part for part in parts if part.stop - part.start >= SHORTEST_SEGMENT)
+        self.segments = tuple(part for part in parts if part.stop - part.start >= SHORTEST_SEGMENT)
         count = sum(part.stop - part.start for part in short)
         self._tell('short_segment', len(short),
                    f'{counted(len(short), "segment")} of fewer than {SHORTEST_SEGMENT} samples, '

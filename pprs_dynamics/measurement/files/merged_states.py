@@ -196,8 +196,7 @@ class States:
         """Topics on which some message has a stamp in its header."""
         return {topic for topic, stamp, _ in self._times if stamp}
 
-    def together(self, signals: Mapping[Key, Signal],
-                 ) -> tuple[Indices, dict[Key, Array], bool]:
+    def together(self, signals: Mapping[Key, Signal]) -> tuple[Indices, dict[Key, Array], bool]:
         """Bring signals to the messages that have the positions of all joints.
 
         Where there are none, to the stamps of the first joint's positions.

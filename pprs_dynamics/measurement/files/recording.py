@@ -221,8 +221,7 @@ def read_recording(
     if not isinstance(drives, RecordedDrives):
         drives = RecordedDrives(tuple(drives))
     with readable(path):
-        read = (read_bag if is_bag(path) and not drives.layout.files
-                else read_table)
+        read = (read_bag if is_bag(path) and not drives.layout.files else read_table)
         samples = read(path, drives, topic, progress)
     samples, applied = _as_efforts(path, _scaled(samples, drives), drives)
     recording = replace(_judged(displayed(path.name), replace(

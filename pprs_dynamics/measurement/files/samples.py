@@ -194,8 +194,7 @@ class Samples:
     @property
     def measured(self) -> dict[str, Array]:
         """Return position, velocity where there is any, and effort by name, (N, D)."""
-        return {name: values for name in QUANTITIES
-                if (values := getattr(self, name)) is not None}
+        return {name: values for name in QUANTITIES if (values := getattr(self, name)) is not None}
 
     def taken(self, index: Indices | Mask) -> Self:
         """Return the samples of an index or a mask."""

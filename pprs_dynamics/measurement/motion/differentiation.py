@@ -242,8 +242,7 @@ def _acceleration_error(stretches: Sequence[Stretch], duration: float, noise: Ar
         wide = LocalPolynomial(max(SHORTEST_WINDOW, _odd(duration / step)), step)
         if len(q) < wide.window:
             continue
-        narrow = LocalPolynomial(
-            max(ORDER + 2, _odd(REFERENCE_RATIO * wide.window)), step)
+        narrow = LocalPolynomial(max(ORDER + 2, _odd(REFERENCE_RATIO * wide.window)), step)
         trim = wide.half - narrow.half
         difference = wide.coefficients[2] - np.pad(narrow.coefficients[2], trim)
         gap = filtered(q - q[len(q) // 2], difference)  # large constants would cost digits

@@ -95,8 +95,7 @@ def smooth_drives(recording: Recording, blocks_per_period: float = 0.0, unit: st
     """
     if recording.are_poses:
         return _held_poses(recording)
-    segments = [part for part in recording.segments
-                if part.stop - part.start > 2 * SHORTEST_WINDOW]
+    segments = [part for part in recording.segments if part.stop - part.start > 2 * SHORTEST_WINDOW]
     if not segments:
         raise MotionError(
             'recording', f'its {len(recording.segments)} segments have at most '
@@ -233,8 +232,7 @@ def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array
 def _differentiated(values: Array, grid: SamplingGrid, filter_: LocalPolynomial, samples: slice,
                     ) -> list[Array]:
     """Return values at equal steps, and their rates, at the samples of a recording."""
-    return [grid.at_samples(rate, filter_.half, samples)
-            for rate in filter_.differentiated(values)]
+    return [grid.at_samples(rate, filter_.half, samples) for rate in filter_.differentiated(values)]
 
 
 def _segments_of(motion: DriveMotion, recording: Recording) -> list[slice]:
@@ -244,9 +242,7 @@ def _segments_of(motion: DriveMotion, recording: Recording) -> list[slice]:
             for first in firsts]
 
 
-def _grids(
-    recording: Recording, segments: Sequence[slice],
-) -> tuple[list[SamplingGrid], list[str]]:
+def _grids(recording: Recording, segments: Sequence[slice]) -> tuple[list[SamplingGrid], list[str]]:
     grids, sayings = [], []
     for part in segments:
         grid, told = find_grid(recording.time[part], recording.position[part])

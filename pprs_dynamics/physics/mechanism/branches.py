@@ -87,8 +87,7 @@ def likely_branches(description: Description, recorded: Collection[str] = ()) ->
 
 def as_likely(description: Description, recorded: Collection[str] = ()) -> list[Branch]:
     """Return the best branch, and others as long that move by other joints."""
-    first, *others = likely_branches(description, recorded) or [
-        Branch(root_of(description), ())]
+    first, *others = likely_branches(description, recorded) or [Branch(root_of(description), ())]
     own = {*first.names}
     return [first, *(branch for branch in others if len(branch.joints) >= len(first.joints)
                      and not own & {*branch.names} and len({*branch.names} & {*recorded})

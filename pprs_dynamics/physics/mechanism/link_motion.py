@@ -337,8 +337,7 @@ class ToolPose:
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
             rows[:, self._drives].copy() for rows in (found.q, found.v, found.a))
-        return (JointMotion(position, velocity, acceleration, motion.time),
-                found.q[:, self._own])
+        return (JointMotion(position, velocity, acceleration, motion.time), found.q[:, self._own])
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:
         """Return the six coordinates of the motion with their derivatives, (N, 6) each.
@@ -363,8 +362,7 @@ class ToolPose:
             dd_psi = e_z + dd_phi * s_theta + d_phi * across * c_theta
         angles = ((psi, np.arctan2(s_theta, c_theta), phi), (d_psi, across, d_phi),
                   (dd_psi, dd_theta, dd_phi))
-        places = (motion.position - self.home.p, motion.linear_velocity,
-                  motion.linear_acceleration)
+        places = (motion.position - self.home.p, motion.linear_velocity, motion.linear_acceleration)
         q, v, a = (np.column_stack((place, *three))
                    for place, three in zip(places, angles, strict=True))
         return q, v, a

@@ -428,8 +428,7 @@ class Mechanism:
         if state.inverse_dynamics is not None or not self.has_guides:
             return np.abs(state.transmitted) if state.inverse_dynamics is None else (
                 state.inverse_dynamics.efforts[LOAD])
-        across = np.cross(state.reactions.f[:, self.guides],
-                          state.links.motion.z[:, self.guides])
+        across = np.cross(state.reactions.f[:, self.guides], state.links.motion.z[:, self.guides])
         load: Array = np.linalg.norm(across, axis=2)
         return load
 

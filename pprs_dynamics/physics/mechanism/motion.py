@@ -39,9 +39,7 @@ FLOAT = np.dtype(np.float64)
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
-def checked_matrix(
-    name: str, value: ArrayLike, width: int, samples: int | None = None,
-) -> Array:
+def checked_matrix(name: str, value: ArrayLike, width: int, samples: int | None = None) -> Array:
     """Return a finite (N, width) array of floats, or raise MotionError naming the quantity."""
     try:
         array = np.array(value, dtype=float, ndmin=2)

@@ -138,8 +138,7 @@ class Excitation:
         coordinates = self._coordinates(knots)
         orientation = Rotation.from_rotvec(coordinates[:, 3:]).as_quat()
         inside = np.clip(times, 0.0, self.duration)
-        motion = PlatformMotion.from_poses(
-            knots, coordinates[:, :3] + HOME, orientation, at=inside)
+        motion = PlatformMotion.from_poses(knots, coordinates[:, :3] + HOME, orientation, at=inside)
         return motion.with_time(times)
 
     def _coordinates(self, t: Array) -> Array:

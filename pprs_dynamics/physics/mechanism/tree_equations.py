@@ -439,8 +439,7 @@ def update_frame_placements(t: Model, m: Data) -> None:
         i = t.joints[j, PARENT]
         s = frames[j, GAIN, 0] * m.motion[Q, t.joints[j, COORDINATE]] + frames[j, GAIN, 1]
         axis = vector(frames, j, AXIS)
-        origin = plus(vector(links, i, P),
-                      turned(links, i, R, vector(frames, j, PLACE_P)))
+        origin = plus(vector(links, i, P), turned(links, i, R, vector(frames, j, PLACE_P)))
         z = turned(links, i, R, turned(frames, j, PLACE_R, axis))
         if t.joints[j, TURNS]:
             # Columns of the rotation about the axis, each taken to the base.
@@ -1038,8 +1037,7 @@ def virtual_motions(t: Model, m: Data, f: Any, F: Any, rubbing: Any, guides: Any
                         along = times(share * t.path[n, SIGN] * t.frames[i, GAIN, 0] * dot(
                             vector(links, i, Z), relative), force)
                         for d in range(drives):
-                            _slide(held, g, drives + d,
-                                   times(T[t.joints[i, COORDINATE], d], along))
+                            _slide(held, g, drives + d, times(T[t.joints[i, COORDINATE], d], along))
     for d in range(len(guides)):
         _slide(moved, guides[d], 2 * drives + d, direction_across(f, links, guides[d]))
     for g in range(len(held)):

@@ -99,9 +99,7 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
         Key(key, 'a standard deviation', lower=0).check(value)
 
 
-def added_effects(
-    parameters: Mapping[str, Any], robot: Any,
-) -> Iterator[CatalogueEffect]:
+def added_effects(parameters: Mapping[str, Any], robot: Any) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active on a robot, all blocks checked."""
     active = ACTIVE.check(parameters.get(ACTIVE.name, []))
     if len(set(active)) < len(active):

@@ -36,8 +36,7 @@ def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Tim
 
 def clock_is_missing(node: Node) -> bool:
     """Return whether the node goes by a simulation's clock that has not come yet."""
-    return bool(node.get_parameter('use_sim_time').value
-                and not node.get_clock().now().nanoseconds)
+    return bool(node.get_parameter('use_sim_time').value and not node.get_clock().now().nanoseconds)
 
 
 class CommandWatchdog:
@@ -111,8 +110,7 @@ class CommandWatchdog:
     def _look(self) -> None:
         self._note_time()
         timeout = round(self._timeout() * NANOSECONDS)
-        stands = (self._steady.now().nanoseconds - self._advanced
-                  >= max(timeout, CLOCK_STANDS))
+        stands = (self._steady.now().nanoseconds - self._advanced >= max(timeout, CLOCK_STANDS))
         if timeout and self.fresh and (stands or self._left + timeout <= 0):
             self.stop()
             self._stale(stands)

@@ -196,8 +196,7 @@ class ModelParameters:
 
     def _staying(self, model: DriveModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values that stay as long as the node runs, as its topics depend on them."""
-        names = {DRIVES_KEY: model.drives,
-                 'joint_prefix and joint_map': model.recorded.joints}
+        names = {DRIVES_KEY: model.drives, 'joint_prefix and joint_map': model.recorded.joints}
         return {**{name: ', '.join(value) for name, value in names.items()},
                 **{own.name: node_values[own.name] for own in self._declared if own.stays}}
 

@@ -141,8 +141,7 @@ def drive_count(node: Node) -> int:
 
 def has_model(given: Mapping[str, Any]) -> bool:
     """Return whether a robot is among the parameters given, and not only changes of the paper's."""
-    return is_described(given) or any(
-        name.startswith('geometry.') for name in given)
+    return is_described(given) or any(name.startswith('geometry.') for name in given)
 
 
 def declare_model(node: Node, arguments: Sequence[str]) -> None:
@@ -165,8 +164,7 @@ def declare_model(node: Node, arguments: Sequence[str]) -> None:
         value = given.get(name, defaults.get(name, entry.default))
         if value is None and name not in given:
             raise ModelError(name, MISSING, entry.rule)
-        _declare(node, entry, entry.check(
-            () if value is None and entry.may_be_empty else value))
+        _declare(node, entry, entry.check(() if value is None and entry.may_be_empty else value))
     added = {name: value for name, value in given.items() if value is not None}
     for name, value in {ACTIVE: [], **added}.items():
         # The ledger is for `pprs history`: a page of numbers that no node reads.

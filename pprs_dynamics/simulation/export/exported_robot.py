@@ -47,8 +47,7 @@ OF_DRIVES = {
     'drive_spring': {'stiffness': STIFFNESS, 'position': SPRINGREF},
 }
 IN_JOINTS = 'joint_friction', 'joint_spring'
-OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
-              'position': SPRINGREF}
+OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS, 'position': SPRINGREF}
 OF_KEYS = {'friction.drives.viscous': DAMPING, 'friction.viscous': DAMPING,
            'friction.coulomb': FRICTION, 'robot.armature': ARMATURE}
 # By joint and name in a format.

@@ -116,8 +116,7 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> bytes:
     The header gets `arrays`: name and shape of each, in order. What is not known is NaN.
     """
     parts = [np.ascontiguousarray(array, dtype='<f4') for array in arrays.values()]
-    shapes = [{'name': name, 'shape': part.shape}
-              for name, part in zip(arrays, parts, strict=True)]
+    shapes = [{'name': name, 'shape': part.shape} for name, part in zip(arrays, parts, strict=True)]
     text = json.dumps({**header, 'arrays': shapes}, allow_nan=False).encode()
     text += b' ' * (-len(text) % 4)  # so that numbers begin at a multiple of their size
     return b''.join((len(text).to_bytes(4, 'little'), text, *(part.tobytes() for part in parts)))

@@ -66,8 +66,7 @@ class ForceRipple(DriveEffect):
     scanned = ('sine', 'cosine')
     is_wave = True
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
-    waves = (Wave('force', 'phase'),
-             Wave('second', 'second_phase', 'second_sine', 'second_cosine'))
+    waves = (Wave('force', 'phase'), Wave('second', 'second_phase', 'second_sine', 'second_cosine'))
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -67,8 +67,7 @@ class TimeDelay(MeasurementEffect):
         late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
         delays = {round(float(d), 9) for d in (*(-delay for delay in late), *late)}
         if abs(covered.delay) > LONGEST - AROUND:
-            near = STEP * np.round(covered.delay / STEP) + np.arange(
-                -AROUND, AROUND + 1e-9, STEP)
+            near = STEP * np.round(covered.delay / STEP) + np.arange(-AROUND, AROUND + 1e-9, STEP)
             delays |= {round(float(d), 9) for d in near} - {0.0}
         return [{'delay': d} for d in sorted(delays)]
 
