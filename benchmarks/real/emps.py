@@ -85,7 +85,9 @@ def error_of(model: DriveModel, recording: Recording) -> float:
 def compared(model: DriveModel, recording: Recording) -> float:
     """Return the relative error of `pprs compare` [%]."""
     residuals, _ = measure_residuals(model, [recording])
-    return relative(residuals.error[:, 0], residuals.measured[:, 0] - residuals.measured.mean())
+    seen = np.isfinite(residuals.error[:, 0])  # not before a delay has passed
+    measured = residuals.measured[seen, 0]
+    return relative(residuals.error[seen, 0], measured - measured.mean())
 
 
 def relative(error: np.ndarray, measured: np.ndarray) -> float:
