@@ -39,6 +39,7 @@ from pprs_dynamics.inference.readings.names import (
 )
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY, Reading
 from pprs_dynamics.inference.residuals.excerpt import excerpt_of
+from pprs_dynamics.measurement.files.poses import FEW, NO_MOTION, held_poses
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import (
@@ -46,7 +47,6 @@ from pprs_dynamics.measurement.files.table_files import (
     TIME_LIKE,
     fraction_of_seconds,
 )
-from pprs_dynamics.measurement.motion.rests import FEW, NO_MOTION, held_poses
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Columns = dict[tuple[str, str], Column]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.measurement.files import signals, stamps
+from pprs_dynamics.measurement.files.poses import held_poses
 from pprs_dynamics.measurement.files.samples import (
     AT_LIMIT,
     BEYOND_LIMIT,
@@ -22,7 +23,6 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     when,
 )
-from pprs_dynamics.measurement.motion.rests import held_poses
 from pprs_dynamics.system.plain_text import counted
 
 # What a differentiating filter needs at least; shorter segments are nothing but edges.
