@@ -133,11 +133,12 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
         Where positions of the joints cannot be found, or two readings are as likely.
     """
     lengths = [len(item.values) for item in series]
-    others_long = [item for item in series if len(item.values) != max(lengths, key=lengths.count)]
-    series = [item for item in series if len(item.values) == max(lengths, key=lengths.count)]
+    usual = max(lengths, key=lengths.count, default=0)
+    others_long = [item for item in series if len(item.values) != usual]
+    series = [item for item in series if len(item.values) == usual]
     time, fraction, time_scale, notes = _time(series, rate is not None)
-    notes += [f'{item.title} has {len(item.values)} numbers, others have {len(series[0].values)}: '
-              'not used' for item in others_long]
+    notes += [f'{item.title} has {len(item.values)} numbers, others have {usual}: not used'
+              for item in others_long]
     left = [item for item in series if time is None or item.column not in (time.column, fraction)]
     times = next((item.values for item in series if time and item.column == time.column),
                  np.zeros(0))
@@ -374,8 +375,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array, ha
     # What was asked for has no noise, and is explained better than what was measured.
     noise = [_noise(values[:, other.blocks.get(EFFORT, other.blocks[POSITION])])
              for _, other in copies]
-    measured_one = max(range(len(copies)), key=lambda k: noise[k] > table.ROUGHER * noise[0])
-    best, layout = copies[measured_one]
+    best, layout = next((pair for pair, own in zip(copies, noise, strict=True)
+                         if own > table.ROUGHER * noise[0]), copies[0])
     used = [place for block in layout.blocks.values() for place in block]
     unused = [place for place in range(len(series)) if place not in used]
     # What a model explains as well may be the efforts, too; a thermometer is a constant.
