@@ -89,7 +89,7 @@ class MechanismEngine:
             if row and row not in of_row:
                 of_row[row], self._frames[row] = name, frame
                 self._prevent_short_cuts(spec.body(name))
-        add_sites(mujoco, spec, structure, {0: (spec.worldbody, self.root)} | {
+        add_sites(spec, structure, {0: (spec.worldbody, self.root)} | {
             row: (spec.body(name), self._frames[row]) for row, name in of_row.items()})
         self.model = spec.compile()
         self.links = {0: 0} | {row: int(self.model.body(name).id) for row, name in of_row.items()}
@@ -152,7 +152,7 @@ class MechanismEngine:
         mass, model.body_ipos[body], moments, axes = principal_inertia(parameters)
         model.body_mass[body] = max(mass, LEAST)
         model.body_inertia[body] = np.maximum(moments, LEAST)
-        model.body_iquat[body] = quaternion(self.engine, axes)
+        model.body_iquat[body] = quaternion(axes)
         self.engine.mj_setConst(model, self.data)
 
     def _require_agreement(self, model: DriveModel) -> None:
@@ -282,20 +282,6 @@ class MechanismEngine:
         return np.cross(carried.forces[:, bodies],
                         carried.axes[:, [self.state.numbers[name] for name in names]])
 
-    def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
-        """Return efforts against friction of joints along a motion, (N, D); see `friction`.
-
-        With more than one round the loads are those with friction of passive joints.
-        """
-        closed = self.closed(motion)
-        effort: Array | None = None
-        for _ in range(rounds):
-            rubbing = self.friction(joints, closed, self.carried(closed, effort))
-            effort = rubbing.efforts(closed.velocity)
-            if rounds > 1:
-                effort[:, self.state.drives] = 0.0  # a guide's friction loads no other joint
-        return rubbing.of_drives(closed)
-
     def _pushed(self, wrench: Array) -> Array:
         """Let the tool apply a wrench (6,) in the base, and return the joints' efforts, (nv,)."""
         data, efforts, site = self.data, np.zeros(self.model.nv), self.state.sites[TOOL]
@@ -352,15 +338,11 @@ class Rubbing(NamedTuple):
         found: Array = self.joints.viscous + self.dry * np.tanh(x) / (x * width)
         return found
 
-    def efforts(self, velocity: Array) -> Array:
-        """Return the efforts of the tree's joints against it, (N, nv)."""
-        rates = np.einsum('nkiv,nv->nki', self.rows, velocity)
-        return np.einsum('nk,nki,nkiv->nv', self.coefficients(rates), rates, self.rows,
-                         optimize=True)
-
     def of_drives(self, closed: EngineMotion) -> Array:
         """Return the efforts of the drives against it, (N, D)."""
-        return np.einsum('nvd,nv->nd', closed.rates, self.efforts(closed.velocity))
+        rates = np.einsum('nkiv,nv->nki', self.rows, closed.velocity)
+        return np.einsum('nk,nki,nkiv,nvd->nd', self.coefficients(rates), rates, self.rows,
+                         closed.rates, optimize=True)
 
 
 def load_engine(purpose: str = 'the simulated robot') -> Any:

@@ -18,6 +18,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -161,8 +162,7 @@ class EngineState:
         velocity, acceleration = np.zeros((2, len(m.q), self.model.nv))
         for q, v, row in self._free:
             position[:, q:q + 3] = (m.p[:, row] - root.p) @ root.R
-            for place, R in zip(position, root.R.T @ m.R[:, row], strict=True):
-                place[q + 3:q + 7] = quaternion(self.engine, R)
+            position[:, q + 3:q + 7] = quaternion(root.R.T @ m.R[:, row])
             for own, linear, angular in ((velocity, m.u, m.w), (acceleration, m.ud, m.wd)):
                 own[:, v:v + 3] = linear[:, row] @ root.R
                 own[:, v + 3:v + 6] = np.einsum('nji,nj->ni', m.R[:, row], angular[:, row])
@@ -247,14 +247,11 @@ class EngineState:
                              'be closed as in the model: please report this file')
 
 
-def add_sites(engine: Any, spec: Any, structure: Structure,
-              bodies: Mapping[int, tuple[Any, Frame]]) -> None:
+def add_sites(spec: Any, structure: Structure, bodies: Mapping[int, tuple[Any, Frame]]) -> None:
     """Add sites for the tool and both sides of each closure to a specification of MuJoCo.
 
     Parameters
     ----------
-    engine : module
-        MuJoCo.
     spec : mujoco.MjSpec
     structure : Structure
     bodies : mapping of int to (body, Frame)
@@ -268,11 +265,9 @@ def add_sites(engine: Any, spec: Any, structure: Structure,
     for name, (row, frame) in sites.items():
         body, own = bodies[row]
         there = own.inverse @ frame
-        body.add_site(name=f'{SITE}{name}', pos=there.p, quat=quaternion(engine, there.R))
+        body.add_site(name=f'{SITE}{name}', pos=there.p, quat=quaternion(there.R))
 
 
-def quaternion(engine: Any, R: Array) -> Array:
-    """Return MuJoCo's quaternion of a rotation."""
-    found = np.empty(4)
-    engine.mju_mat2Quat(found, np.ascontiguousarray(R).ravel())
-    return found
+def quaternion(R: Array) -> Array:
+    """Return MuJoCo's quaternions w x y z of rotations, (..., 4)."""
+    return np.roll(Rotation.from_matrix(R).as_quat(), 1, axis=-1)

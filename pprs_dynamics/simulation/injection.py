@@ -155,8 +155,6 @@ class PlainRobot:
     model : DriveModel
     motion : JointMotion
         Of the drives.
-    rounds : int
-        1: friction follows loads without friction, as in the model; more: with friction.
 
     Attributes
     ----------
@@ -168,12 +166,12 @@ class PlainRobot:
         Efforts of friction, offset and armature; all efforts of the drives.
     """
 
-    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1) -> None:
-        self.model, self.motion, self.rounds = model, motion, rounds
+    def __init__(self, model: DriveModel, motion: JointMotion) -> None:
+        self.model, self.motion = model, motion
         self.engine = MechanismEngine(model)
         self.closed = self.engine.closed(motion)
         self.carried = self.engine.carried(self.closed)
-        self.friction = own_friction(model, self.engine, motion, rounds)
+        self.friction = own_friction(model, self.engine, motion)
         self.effort = self.carried.efforts + self.friction
 
 
@@ -322,7 +320,7 @@ class Injection(Injecting):
                 motion, velocity=motion.velocity + wound,
                 acceleration=motion.acceleration + np.gradient(wound, self.time, axis=0))
         if self.truths:
-            friction = own_friction(self.model, self.engine, motion, self.plain.rounds)
+            friction = own_friction(self.model, self.engine, motion)
         self.efforts = self.bodies + friction
         self.largest = np.abs(self.efforts).max(axis=0)
         self.temperature = draw_temperatures(self.climate, self.time, self.motion.velocity)
@@ -850,11 +848,12 @@ def own_joint_friction(model: DriveModel) -> JointFriction:
         strict=True)))
 
 
-def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion,
-                 rounds: int = 1) -> Array:
+def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    friction: Array = (model.robot.armature * motion.acceleration + model.offset + (
-        engine.joint_friction(motion, own_joint_friction(model), rounds)))
+    closed = engine.closed(motion)
+    rubbing = engine.friction(own_joint_friction(model), closed, engine.carried(closed))
+    friction: Array = (
+        model.robot.armature * motion.acceleration + model.offset + rubbing.of_drives(closed))
     return friction
 
 

@@ -32,6 +32,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import APPROACHES, EQUATIONS, JOINTS, ROBOT
 from pprs_dynamics.physics.model.robot_block import STANDARD_GRAVITY
 from pprs_dynamics.physics.three_pprs.robot import HINGES
+from pprs_dynamics.simulation.engine_state import quaternion
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -400,11 +401,6 @@ def _drawn(robot: ExportedRobot) -> Mapping[int, list[Array]]:
             for row, those in points.items()}
 
 
-def _quaternion(R: Array) -> Array:
-    """Return w x y z."""
-    return np.roll(Rotation.from_matrix(R).as_quat(), 1)
-
-
 def _rpy(R: Array) -> tuple[float, float, float]:
     """Return roll, pitch and yaw about fixed axes."""
     return (math.atan2(R[2, 1], R[2, 2]), math.atan2(-R[2, 0], math.hypot(R[2, 1], R[2, 2])),
@@ -423,8 +419,8 @@ def _mjcf(robot: ExportedRobot) -> Element:
     drawn, width = _drawn(robot), THICKNESS * structure.size
     for body in robot.bodies:
         own = elements[body.row] = _add(elements[body.parent], 'body', name=body.name,
-                                        pos=body.frame.p, quat=_quaternion(body.frame.R))
-        _add(own, 'inertial', pos=body.centre, quat=_quaternion(body.axes), mass=body.mass,
+                                        pos=body.frame.p, quat=quaternion(body.frame.R))
+        _add(own, 'inertial', pos=body.centre, quat=quaternion(body.axes), mass=body.mass,
              diaginertia=body.moments)
         if body.kind == FREE:
             _add(own, 'freejoint', name=body.joint.name)
@@ -437,14 +433,14 @@ def _mjcf(robot: ExportedRobot) -> Element:
         if not drawn[body.row]:
             _add(own, 'geom', type='sphere', size=width, contype='0', conaffinity='0', group='1')
     for name, row, frame in robot.frames:
-        _add(elements[row], 'site', name=name, pos=frame.p, quat=_quaternion(frame.R))
+        _add(elements[row], 'site', name=name, pos=frame.p, quat=quaternion(frame.R))
     _close(robot, elements, _add(root, 'equality'))
     actuators = _add(root, 'actuator')
     for name, effort in zip(structure.drives, structure.effort, strict=True):
         _add(actuators, 'motor', name=name, joint=name,
              ctrlrange=(-effort, effort) if math.isfinite(effort) else None)
     _add(_add(root, 'keyframe'), 'key', name='home', qpos=np.concatenate([
-        (*body.frame.p, *_quaternion(body.frame.R)) if body.kind == FREE else (body.home,)
+        (*body.frame.p, *quaternion(body.frame.R)) if body.kind == FREE else (body.home,)
         for body in robot.bodies]))
     return root
 
@@ -470,7 +466,7 @@ def _close(robot: ExportedRobot, elements: Mapping[int, Element], equality: Elem
         for name, along in points.items():
             for side, rows, R, p in (('a', t.loop_a, t.a_R, t.a_p), ('b', t.loop_b, t.b_R, t.b_p)):
                 _add(elements[int(rows[k])], 'site', name=f'{name}_{side}',
-                     pos=p[k] + along * R[k][:, 2], quat=_quaternion(R[k]))
+                     pos=p[k] + along * R[k][:, 2], quat=quaternion(R[k]))
             _add(equality, 'weld' if loop.kind == 'fixed' else 'connect', name=name,
                  site1=f'{name}_a', site2=f'{name}_b')
     for name, leader, ratio, offset in structure.couplings:

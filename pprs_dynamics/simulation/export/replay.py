@@ -41,7 +41,7 @@ def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion
     structure, spec = robot.mechanism.structure, mujoco.MjSpec.from_string(text)
     if kind != MJCF:
         spec.option.gravity = robot.mechanism.gravity
-    add_sites(mujoco, spec, structure, {0: (spec.worldbody, Frame())} | {
+    add_sites(spec, structure, {0: (spec.worldbody, Frame())} | {
         body.row: (spec.body(body.name), Frame()) for body in robot.bodies})
     model = spec.compile()
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
