@@ -89,6 +89,8 @@ class DriveControl:
     settings : ControlSettings
     step : float
         Time between two calls of `effort` [s].
+    position : (D,) array
+        As measured, where the drives hold at first [m, rad].
     smoothing : float
         Share of a change that measured velocities show after one step: 1 for tachometers, less
         for differentiated positions behind a first-order low-pass.
@@ -102,19 +104,14 @@ class DriveControl:
     """
 
     def __init__(self, limits: DriveLimits, weight: Callable[[Array], Array],
-                 settings: ControlSettings, step: float, smoothing: float = 1.0) -> None:
+                 settings: ControlSettings, step: float, position: Array,
+                 smoothing: float = 1.0) -> None:
         self.settings, self._limits, self._weight = settings, limits, weight
         self._smoothing = smoothing
-        count = len(limits.drives)
         self._delay_line: deque[Array] = deque(maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
-        self._at_limit = np.zeros(count, dtype=bool)
-        self._nothing = np.zeros(count)
-        self.start(self._nothing)
-
-    def start(self, position: Array) -> None:
-        """Hold at measured drive positions (D,) [m, rad], with nothing on its way to the drives."""
-        self._delay_line.clear()
+        self._at_limit = np.zeros(len(position), dtype=bool)
+        self._nothing = np.zeros_like(position)
         self._wanted_speed: tuple[Array, Array] | None = None
         self._hold(position)
 

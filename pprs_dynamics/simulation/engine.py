@@ -23,7 +23,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.mjcf import inertial_of, readable_spec
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
-from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
+from pprs_dynamics.physics.mechanism.urdf import WORLD, urdf_content
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_values import source_of_errors
 from pprs_dynamics.physics.model.robot_block import described_gravity
@@ -373,7 +373,7 @@ def _is_body(parameters: Array) -> bool:
 
 def _bare(path: Path, refused: Container[str]) -> str:
     """Return a URDF without shapes, and without the inertia of links that MuJoCo refuses."""
-    robot = ElementTree.fromstring(expanded(str(path)))
+    robot = ElementTree.fromstring(urdf_content(str(path)))
     for link in robot.findall('link'):
         inertia = link.findall('inertial') if link.get('name', '') in refused else []
         for part in (*link.findall('visual'), *link.findall('collision'), *inertia):

@@ -136,8 +136,9 @@ class Plant(Injecting):
             span = self.upper - self.lower
         self._span = np.where(np.isfinite(span), span, 2 * np.pi)
         self.time = 0.0
-        self._rest = np.zeros_like(home)
-        self.place(home)
+        self.position = home
+        self.velocity = self.last_acceleration = self._held = self._rest = np.zeros_like(home)
+        self.holding(home)
         M = self._equations(home, self._rest, self._rest)[0]
         alone = np.diag(M)
         # A loop for `alone` would be unstable in the lightest motion, one for that weak in all
@@ -214,25 +215,10 @@ class Plant(Injecting):
         """
         try:
             rest = self._rest[None]
-            self._held: Array = self.model.robot.torques(position[None], rest, rest)[0]
+            self._held = self.model.robot.torques(position[None], rest, rest)[0]
         except WorkspaceError:
             pass
         return self._held + self._offset
-
-    def place(self, position: Array, velocity: Array | None = None) -> None:
-        """Put the drives at positions (D,), at rest or with velocities.
-
-        Raises
-        ------
-        WorkspaceError
-            Where the mechanism cannot go there.
-        """
-        self.position = np.array(position, dtype=float)
-        self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
-        self.engine.closed(JointMotion(self.position[None], self.velocity[None], self._rest[None]))
-        self.last_acceleration = np.zeros_like(self.position)
-        self._held = self._rest
-        self._held = self.holding(self.position) - self._offset
 
     def step(self, effort: Array) -> None:
         """Advance by one time step under constant efforts (D,).

@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
+from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note
 from pprs_dynamics.simulation.plant import Plant, UnsolvedError
 
 CORRELATED, CORRELATION = 0.36, 0.9  # share of the noise's variance, and from sample to sample
@@ -62,6 +62,8 @@ class Sensors:
     rng : numpy.random.Generator
     scale : (D,) array
         Units in which the settings give the noise of the efforts.
+    position : (D,) array
+        At the start, at rest [m, rad].
 
     Attributes
     ----------
@@ -72,16 +74,12 @@ class Sensors:
     """
 
     def __init__(self, settings: SensorSettings, step: float, rng: np.random.Generator,
-                 scale: Array) -> None:
+                 scale: Array, position: Array) -> None:
         self.settings, self._step, self._rng = settings, step, rng
         self._noise = settings.effort_noise * scale
         self._correlated = rng.standard_normal(len(scale))
-        self.position, self.velocity = np.zeros((2, len(scale)))
+        self.position, self.velocity = settings.quantised(position), np.zeros(len(scale))
         self.smoothing = 1 - float(np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
-
-    def start(self, position: Array, velocity: Array) -> None:
-        """Forget the past: the robot is at (D,) [m] and moves with (D,) [m/s]."""
-        self.position, self.velocity = self.settings.quantised(position), np.array(velocity)
 
     def read_encoders(self, position: Array) -> None:
         """Take the true positions, (D,)."""
@@ -105,7 +103,7 @@ BANDWIDTH, DAMPING_RATIO = 7.0, 0.9  # of the drives' loops, by default [Hz, 1]
 class SimulatedRobot:
     """A robot to run against; it starts at home and holds.
 
-    Call `command` whenever a command arrives, and `tick` at the rate of the plant.
+    Call `control.command` whenever a command arrives, and `tick` at the rate of the plant.
 
     Parameters
     ----------
@@ -119,37 +117,19 @@ class SimulatedRobot:
                  sensors: SensorSettings | None = None) -> None:
         self.plant, step = plant, plant.time_step
         self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
-                               plant.largest)
+                               plant.largest, plant.position)
         self.control = DriveControl(
             plant.limits, plant.holding, control or plant.gains(BANDWIDTH, DAMPING_RATIO), step,
-            self.sensors.smoothing)
+            self.sensors.position, self.sensors.smoothing)
         self.notes = self.control.notes
         self._ticks = 0
-        self.place(plant.position)
+        self._effort: Array | None = None
+        self._stopped = False
 
     @property
     def time(self) -> float:
         """Time since the start [s]."""
         return self._ticks * self.plant.steps_per_tick * self.plant.time_step
-
-    def place(self, position: Array, velocity: Array | None = None) -> None:
-        """Put the drives at positions (D,) [m, rad], at rest or with velocities [m/s, rad/s].
-
-        Raises
-        ------
-        WorkspaceError
-            Where the mechanism cannot go there.
-        """
-        self.plant.place(position, velocity)
-        self.sensors.start(self.plant.position, self.plant.velocity)
-        self.control.start(self.sensors.position)
-        self._effort: Array | None = None
-        self._stopped = False
-
-    def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
-        """Take a command for now, and the next tick's where it is known; False if refused."""
-        return self.control.command(
-            self.time, setpoint, following, self.plant.steps_per_tick * self.plant.time_step)
 
     def tick(self) -> Measurement:
         """Return the readings now, and advance to the next tick."""

@@ -260,18 +260,6 @@ def test_loops_that_only_a_model_file_can_have_are_refused(tmp_path: Path) -> No
         one_link(tmp_path, (0.01, 0.08, 0.08), '<constraint name="hinge" type="revolute"/>')
 
 
-XACRO = '''<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">
-<xacro:property name="m" value="3"/><link name="x"><inertial><mass value="${2*m}"/></inertial>
-</link></robot>'''
-
-
-def test_the_real_xacro_is_run_as_such(tmp_path: Path) -> None:
-    pytest.importorskip('xacro')
-    path = tmp_path / 'robot.urdf.xacro'
-    path.write_text(XACRO)
-    assert read_urdf(str(path)).links['x'][0] == 6
-
-
 def gear(tag: str, kind: str, side: str, number: str) -> str:
     inside = f'<{tag}>{number}</{tag}>'
     return (f'<transmission name="t"><{kind}>transmission_interface/SimpleTransmission</{kind}>'

@@ -61,6 +61,12 @@ def test_the_model_needs_the_efforts_under_which_the_plant_accelerates(
     assert needed == pytest.approx(effort, abs=1e-5 * plant.largest.max())
 
 
+def command(robot: SimulatedRobot, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
+    """Command a robot now, and the next tick's where it is known."""
+    return robot.control.command(robot.time, setpoint, following,
+                                 robot.plant.steps_per_tick * robot.plant.time_step)
+
+
 @pytest.mark.parametrize('name', ['platform', 'hexapod', 'delta', 'arm'])
 def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
     tmp_path: Path, name: str,
@@ -75,7 +81,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
                                               strict=True)]
     measured = []
     for now, following in pairwise(points):
-        assert robot.command(now, following)
+        assert command(robot, now, following)
         measured.append(robot.tick())
     error = np.array([sample.position for sample in measured]) - motion.position[:-1]
     assert np.abs(error).max() < 1e-3 * np.ptp(motion.position, axis=0).max()
@@ -90,7 +96,7 @@ def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9, command_timeout=np.inf),
                            sensors=QUIET)
     goal = plant.position + np.array([3.0, -3.0, 2.0, 0.0, 1.0, -2.0]) * 1e-3
-    robot.command(Setpoint(goal, np.zeros(6), plant.holding(goal)))
+    command(robot, Setpoint(goal, np.zeros(6), plant.holding(goal)))
     for _ in range(400):
         robot.tick()
     # Friction that turns over within 2 mm/s lets it creep the last of the way.
@@ -106,9 +112,9 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
     for _ in range(50):
         robot.tick()
     assert plant.position == pytest.approx(home, abs=1e-9)
-    assert not robot.command(Setpoint(home + 1.0, np.zeros(6)))
+    assert not command(robot, Setpoint(home + 1.0, np.zeros(6)))
     assert 'leg_1 would have to be at 1.4847 m' in robot.notes[-1].message
-    robot.command(Setpoint(None, None, np.full(6, 1e6)))
+    command(robot, Setpoint(None, None, np.full(6, 1e6)))
     robot.tick()
     assert robot.notes[-1].code == 'SATURATED'
     assert ' N, limits' in robot.notes[-1].message or 'URDF' in robot.notes[-1].message
@@ -244,7 +250,7 @@ def wave(robot: SimulatedRobot, duration: float, feedforward: bool = True,
                        size * rate ** 2 * np.cos(rate * t))
             effort = AXIS.drive_forces(pprs_dynamics.JointMotion([[q]], [[v]], [[a]])).total[0]
             points.append(Setpoint(np.array([q]), np.array([v]), effort if feedforward else ZERO))
-        assert robot.command(*points)
+        assert command(robot, *points)
         true.append((robot.plant.position[0], robot.plant.velocity[0], points[0].position[0]))
         measured.append(robot.tick())
     return measured, np.array(true)
@@ -261,7 +267,7 @@ def test_feedforward_lowers_the_tracking_error() -> None:
 def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
     speed, period, step = 0.2, 0.005, 0.0005
-    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), step)
+    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), step, ZERO)
 
     def setpoint(time: float) -> Setpoint:
         return Setpoint(np.array([speed * time]), np.array([speed]))
@@ -275,7 +281,7 @@ def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
 @pytest.mark.parametrize('late', [0.05, 0.15, 1e4])
 def test_setpoints_that_come_late_are_followed_as_long_as_they_come(late: float) -> None:
     speed, period = np.array([0.2]), 0.01
-    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), period)
+    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), period, ZERO)
     led = min(late, LONGEST_LATE) * speed  # its velocity leads on from its own time
     for now in np.arange(late, late + 0.5, period):
         goal = speed * (now - late)
@@ -301,7 +307,7 @@ def test_without_commands_the_robot_holds_where_it_is() -> None:
 
 def test_efforts_beyond_limits_are_limited_and_reported() -> None:
     limits = AXIS.limits.with_efforts([13.0])
-    control = DriveControl(limits, np.zeros_like, ControlSettings(), 0.002)
+    control = DriveControl(limits, np.zeros_like, ControlSettings(), 0.002, ZERO)
     control.command(0.0, Setpoint(effort=np.array([50.0])))
     assert [control.effort(k * 0.002, ZERO, ZERO)[0] for k in range(5)] == [13.0] * 5
     assert [note.code for note in control.notes] == ['SATURATED']
@@ -311,7 +317,7 @@ def test_efforts_beyond_limits_are_limited_and_reported() -> None:
 def test_efforts_alone_are_applied_as_they_are() -> None:
     robot = axis()
     for _ in range(3):
-        assert robot.command(Setpoint(effort=np.array([7.0])))
+        assert command(robot, Setpoint(effort=np.array([7.0])))
         measured = robot.tick()
     assert measured.effort[0] == 7.0
 
@@ -322,7 +328,7 @@ def test_efforts_alone_are_applied_as_they_are() -> None:
     ids=['nan', 'two', 'inf', 'no velocity', 'overflow'])
 def test_impossible_commands_are_refused(setpoint: Setpoint) -> None:
     robot = axis()
-    assert not robot.command(setpoint)
+    assert not command(robot, setpoint)
     assert robot.notes[-1].code == 'REFUSED'
     assert robot.control.holding
     assert np.all(np.isfinite(robot.tick().position))
@@ -333,7 +339,7 @@ def test_impossible_commands_are_refused(setpoint: Setpoint) -> None:
 def test_the_largest_commands_leave_every_number_finite(size: float, following: float) -> None:
     robot = axis(SensorSettings())
     large = np.array([size])
-    assert robot.command(Setpoint(ZERO, large, -large),
+    assert command(robot, Setpoint(ZERO, large, -large),
                          Setpoint(ZERO, np.array([-following]), np.array([following])))
     for _ in range(60):
         measured = robot.tick()
@@ -345,7 +351,7 @@ def test_stops_end_the_strokes() -> None:
     plant = Plant(DriveModel.load('config/delta.yaml'))
     robot = SimulatedRobot(plant, sensors=EXACT)
     for _ in range(300):
-        robot.command(Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))
+        command(robot, Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))
         robot.tick()
     assert np.all(plant.position < plant.upper + 0.1)
 

@@ -41,7 +41,7 @@ from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 from pprs_dynamics.physics.mechanism.branches import Branch, as_likely, branch_to, root_of
 from pprs_dynamics.physics.mechanism.description import FIXED, FLOATING, PRISMATIC, Description
-from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
+from pprs_dynamics.physics.mechanism.urdf import read_urdf, urdf_content
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 from pprs_dynamics.physics.model.recorded_names import (
@@ -314,7 +314,7 @@ def _questions_of_names(draft: FirstModel) -> list[str]:
 
 def _root_tag(path: Path) -> str:
     try:
-        return ElementTree.fromstring(expanded(str(path))).tag
+        return ElementTree.fromstring(urdf_content(str(path))).tag
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise UnreadableFileError(
             path, 'no URDF or MJCF: name the description of the robot first, then recordings, as '

@@ -3,13 +3,11 @@
 
 """Robot descriptions from URDF: links with their inertia, joints with their limits.
 
-Gears are read from `<transmission>`. What is xacro yet is run through the package of that name, if
-it is installed.
+Gears are read from `<transmission>`.
 """
 
 from __future__ import annotations
 
-import codecs
 import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
@@ -47,7 +45,7 @@ LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have s
 Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
 # Macros, and expressions in attributes, as xacro has them.
-# What xacro made of a file keeps its comments, with what was commented out.
+# Its output keeps the comments, with what was commented out.
 COMMENT = re.compile(rb'<!--.*?-->', re.DOTALL)
 XACRO = re.compile(rb'<xacro:|=["\'][^"\']*\$[{(]')
 REDUCTIONS = ('mechanicalReduction', 'mechanical_reduction')
@@ -79,33 +77,22 @@ def read_urdf(path: str) -> Description:
     UnreadableFileError
         Where the file is missing, no URDF, or does not make a tree.
     """
-    return _described(expanded(path), str(path))
+    return _described(urdf_content(path), str(path))
 
 
-def expanded(path: str) -> bytes:
-    """Return the URDF in a file, with xacro in it run through the `xacro` package.
+def urdf_content(path: str) -> bytes:
+    """Return the URDF in a file.
 
     Raises
     ------
     UnreadableFileError
-        Where the file cannot be read, or holds xacro that cannot be run.
+        Where the file cannot be read, or holds xacro.
     """
     content = read_content(path)
-    is_xml = content.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b'<')
-    if not is_xml or not XACRO.search(COMMENT.sub(b'', content)):
-        return content
-    try:
-        import xacro
-    except ImportError:
+    if b'<robot' in content and XACRO.search(COMMENT.sub(b'', content)):
         raise UnreadableFileError(path, 'holds xacro, which is no URDF yet: run `xacro '
-                                  f'{Path(path).name} > robot.urdf` and name that, or `pip '
-                                  'install xacro`') from None
-    try:
-        text: str = xacro.process_file(path).toxml()
-    except Exception as error:  # of any kind, as of what its expressions evaluate
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        raise UnreadableFileError(path, f'holds xacro that cannot be run: {reason}') from None
-    return text.encode()
+                                  f'{Path(path).name} > robot.urdf` and name that')
+    return content
 
 
 @lru_cache(maxsize=16)
