@@ -59,14 +59,7 @@ def beside(path: object) -> str:
     return os.path.join(folder, close) if close and close != name else ''
 
 
-class Missing:
-    """Marks a value that is absent, unlike None."""
-
-    def __repr__(self) -> str:
-        return 'missing'
-
-
-MISSING = Missing()
+MISSING = object()  # a value that is absent, unlike None
 
 
 class PprsError(Exception):

@@ -46,8 +46,6 @@ class LiveStream:
     topic : str
     window, span : float, optional
         As `LiveComparison`.
-    clock : callable, optional
-        Returns a time that only goes on [s].
 
     Attributes
     ----------
@@ -61,9 +59,8 @@ class LiveStream:
         self, node: Node, model: DriveModel, take: Callable[[int, Array, Array], None],
         reject: Callable[[Rejection], None], is_active: Callable[[], bool] = lambda: True,
         topic: str = TOPIC, window: float | None = None, span: float = ERROR_SPAN,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._node, self._topic, self._take, self._clock = node, topic, take, clock
+        self._node, self._topic, self._take = node, topic, take
         self._reject, self._is_active = reject, is_active
         self._joints = RobotNames.of(model).joints
         self._window, self._span = window, span
@@ -82,7 +79,7 @@ class LiveStream:
             self._stamp = 0
             self._begins_anew = self._cannot_begin = False
             self.trouble: Rejection | None = None
-            now = self._clock()
+            now = time.monotonic()
             self._received = self._advanced = self._measured = self._compared = now
 
     def listen(self) -> None:
@@ -105,7 +102,7 @@ class LiveStream:
         if not self._is_active():
             return
         self.counters['received'] += 1
-        self._received = self._clock()
+        self._received = time.monotonic()
         try:
             with self.lock:
                 self._push(data)
@@ -149,7 +146,7 @@ class LiveStream:
         if compared is not None:
             self.trouble = None
             self.counters['compared'] += len(compared.time)
-            self._compared = self._clock()
+            self._compared = time.monotonic()
         return compared
 
     def stamp_of(self, moment: float) -> int:
@@ -159,11 +156,11 @@ class LiveStream:
     @property
     def measures_no_effort(self) -> bool:
         """Whether no effort has been a number for a while."""
-        return self._clock() - self._measured > PATIENCE
+        return time.monotonic() - self._measured > PATIENCE
 
     def waits_for(self) -> tuple[Code, str] | None:
         """Return why nothing has been compared for `PATIENCE`, as code and sentence."""
-        now = self._clock()
+        now = time.monotonic()
         if now - self._compared <= PATIENCE:
             return None
         topic = self._node.resolve_topic_name(self._topic)

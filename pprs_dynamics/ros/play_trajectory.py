@@ -168,7 +168,7 @@ def _path(values: dict[str, Any]) -> PlatformMotion:
     if values['source'] == 'csv':
         if not values['file']:
             raise ModelError('file', '', 'be a CSV of poses where source is csv')
-        motion = read_poses(values['file'], values['rate'])
+        motion = read_poses(values['file']).resampled(values['rate'])
     else:
         path = (Excitation(duration=values['duration'], seed=values['seed'])
                 if values['source'] == EXCITATION else HelicalPath())

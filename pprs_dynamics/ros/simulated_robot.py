@@ -182,12 +182,9 @@ class SimulatedRobotNode(Node):
         self._queue.add(time, setpoint)
 
     def _take_efforts(self, data: bytes) -> None:
-        efforts = np.array(message_in(data, Float64MultiArray).data)
-        count = len(self._names.joints)
-        if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
-            raise PprsError(f'data has {len(efforts)} values, must be {count} finite efforts')
         self._queue.clear()
-        self._queue.add(self._now(), Setpoint(None, None, efforts))
+        self._queue.add(self._now(), Setpoint(
+            effort=np.array(message_in(data, Float64MultiArray).data)))
 
     def _judge_timing(self) -> None:
         late = self._counters['late'] - self._late_before

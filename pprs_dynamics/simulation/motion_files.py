@@ -29,15 +29,8 @@ TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'a
 QUANTITIES = ('position', 'velocity', 'acceleration')  # of a joint
 
 
-def read_poses(path: str | PathLike[str], rate: float | None = None) -> PlatformMotion:
+def read_poses(path: str | PathLike[str]) -> PlatformMotion:
     """Return the motion in a CSV of poses, columns in any order.
-
-    Parameters
-    ----------
-    path : path
-    rate : float, optional
-        Resample to this rate [Hz]. A file with twists must have it already: its twists are
-        taken as they are, and nothing in between is invented.
 
     Raises
     ------
@@ -53,19 +46,12 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
     time, position, orientation = numbers[:, 0], numbers[:, 1:4], numbers[:, 4:8]
     try:
         if columns == POSE_COLUMNS:
-            motion = PlatformMotion.from_poses(time, position, orientation)
-            return motion if rate is None else motion.resampled(rate)
+            return PlatformMotion.from_poses(time, position, orientation)
         v, omega, a, epsilon = np.split(numbers[:, 8:], 4, axis=1)
-        motion = PlatformMotion(position, orientation, v, omega, a, epsilon, time)
+        return PlatformMotion(position, orientation, v, omega, a, epsilon, time)
     except MotionError as error:
         raise MotionError(f'{path}: {error.quantity}', error.found, error.rule,
                           error.kind) from None
-    if rate is not None and len(motion) > 1 and not np.allclose(
-            np.diff(time) * rate, 1.0, rtol=0, atol=1e-6):
-        raise UnreadableFileError(
-            path, f'its twists belong to {1 / np.median(np.diff(time)):.6g} Hz, evenly spaced, but '
-            f'{rate:g} Hz are wanted: choose that rate, or leave the twists out')
-    return motion
 
 
 def write_motion(path: str | PathLike[str], drives: tuple[str, ...],
@@ -76,11 +62,8 @@ def write_motion(path: str | PathLike[str], drives: tuple[str, ...],
     ------
     UnreadableFileError
         Where it cannot be written.
-    MotionError
-        For a motion without times.
     """
-    if motion.time is None:
-        raise MotionError('time', 'it is absent', 'be known to be written', 'time')
+    assert motion.time is not None
     if isinstance(motion, JointMotion):
         names = [f'{joint}/{name}' for joint in drives for name in QUANTITIES]
         table = np.stack([getattr(motion, name) for name in QUANTITIES], axis=-1)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Sequence
+from typing import Any
 
 # Name of the error handler for streams that are not UTF-8.
 PLAIN = 'pprs_plain'
@@ -45,9 +46,7 @@ def _escaped(character: str) -> str:
     return character.encode('unicode_escape').decode('ascii')
 
 
-def _in_plain(error: UnicodeError) -> tuple[str, int]:
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
+def _in_plain(error: Any) -> tuple[str, int]:
     return ''.join(SUBSTITUTES.get(character) or _escaped(character)
                    for character in error.object[error.start:error.end]), error.end
 

@@ -111,7 +111,7 @@ def test_drives_are_chips_and_values_can_be_typed(page: Page) -> None:
     page.tab.wait_for_function('bench.state.departure === 0')
     field.fill('1e99')
     field.press('Enter')
-    page.tab.locator('#message', has_text='must be between').wait_for()
+    page.tab.locator('#message', has_text='must be a number between').wait_for()
 
 
 def test_a_mark_says_where_the_error_is_from(page: Page) -> None:

@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError, optional_library
+from pprs_dynamics.errors import UnreadableFileError, optional_library
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.csv_files import ZSTANDARD, zstd
 from pprs_dynamics.measurement.files.joint_states import deserialized, message_types
@@ -206,12 +206,10 @@ def _storages_of(path: Path) -> tuple[list[Path], list[Defect]]:
 
 
 def _unpacked(path: Path, folder: Path) -> Path:
-    target = folder / path.stem
+    target, library = folder / path.stem, zstd()
     try:
-        with zstd().open(path, 'rb') as packed, target.open('wb') as file:
+        with library.open(path, 'rb') as packed, target.open('wb') as file:
             shutil.copyfileobj(packed, file)
-    except MissingLibraryError:
-        raise
     except Exception as error:  # the library's own, and the disk's
         raise UnreadableFileError(path, f'it cannot be unpacked ({error})') from None
     return target
@@ -219,9 +217,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
 
 def _check_lengths(path: Path, storage: Path) -> None:
     """Refuse databases shorter than they say: SQLite itself reads zeros where they end."""
-    for file in storage.iterdir() if storage.is_dir() else [storage]:
-        if file.is_dir():
-            continue
+    for file in [f for f in storage.iterdir() if not f.is_dir()] if storage.is_dir() else [storage]:
         require_file(file)
         with file.open('rb') as data:
             head = data.read(32)

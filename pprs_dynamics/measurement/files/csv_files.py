@@ -202,10 +202,6 @@ class CsvTable:
             return column - 1 if column <= self.count else None
         return self.names.index(column) if column in self.names else None
 
-    def title(self, place: int) -> str:
-        """Return the title of a column."""
-        return self.names[place] if self.names else str(place + 1)
-
     def _numbers(self, lines: list[str], start: int, used: Sequence[int], dates: set[int]) -> Array:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
@@ -256,8 +252,9 @@ class CsvTable:
         except ValueError:
             comma = (' (a decimal comma: write columns: {decimal: ","} in the model file)'
                      if re.fullmatch(r'[-+\d]+,\d+', cell) else '')
+            name = self.names[column] if self.names else column + 1
             raise UnreadableFileError(
-                self.path, f'row {line}, column {self.title(column)} must contain a number, but '
+                self.path, f'row {line}, column {name} must contain a number, but '
                 f'contains {cell[:40]!r}{comma}') from None
 
 

@@ -158,19 +158,14 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
     except (Exception, SystemExit) as error:  # another package's code may do anything
         reason = ' '.join(f'{type(error).__name__}: {error}'.split())
         raise _UnusableEffectError(f'it cannot be imported ({reason})') from error
-    if not (inspect.isclass(effect) and issubclass(effect, CatalogueEffect)):
-        raise _UnusableEffectError('it must be a class derived from CatalogueEffect, e.g. a '
-                                   'DriveEffect')
-    if not isinstance(getattr(effect, 'name', None), str):
-        raise _UnusableEffectError(f'{effect.__name__} must have name, a str')
+    if not (inspect.isclass(effect) and issubclass(effect, CatalogueEffect)
+            and hasattr(effect, 'linear') and str(getattr(effect, 'name', '')).isidentifier()):
+        raise _UnusableEffectError(
+            'it must be a class derived from CatalogueEffect, e.g. a DriveEffect, with linear, a '
+            'tuple of Parameter, and name, a word of letters, digits and _')
     if not effect.card.equation:
         raise _UnusableEffectError(f'the docstring of {effect.__name__} must have a section '
                                    'Equation')
-    if not hasattr(effect, 'parameters'):
-        raise _UnusableEffectError(f'{effect.__name__} must have linear, a tuple of Parameter')
-    if not effect.name.isidentifier():
-        raise _UnusableEffectError(
-            f'its name {effect.name!r} must be one word of letters, digits and _')
     if effect.name in (*known, *EFFECTS, *RESERVED):
         raise _UnusableEffectError(f'the name {effect.name} is taken')
     guard(effect)

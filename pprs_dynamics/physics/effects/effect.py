@@ -84,11 +84,10 @@ class Parameter:
 
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ModelError(key, value, f'be a number ({self.description} [{self.unit}])')
         # Bounds are finite, so that what lies within is, too.
-        if not self.lower <= value <= self.upper:
-            raise ModelError(key, value, f'be between {self.lower:g} and {self.upper:g} '
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not (
+                self.lower <= value <= self.upper):
+            raise ModelError(key, value, f'be a number between {self.lower:g} and {self.upper:g} '
                              f'({self.description} [{self.unit}])')
         return float(value)
 

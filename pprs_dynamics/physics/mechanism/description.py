@@ -48,10 +48,6 @@ class Frame:
         T[:3, :3], T[:3, 3] = self.R, self.p
         return T
 
-    def of_point(self, point: Array) -> Array:
-        """Return a point of this frame in the one that it stands in."""
-        return self.R @ point + self.p
-
     @classmethod
     def of(cls, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Frame:
         """Return the frame at xyz [m], turned by roll, pitch and yaw about fixed axes [rad]."""

@@ -163,7 +163,8 @@ class Mechanism:
     def centre_of(self, link: str) -> Array:
         """Return the centre of mass of a body in the frame of one of its links, (3,) [m]."""
         row, frame = self.structure.links[link]
-        return frame.inverse.of_point(self.by_joint[row, 1:4] / self.by_joint[row, 0])
+        centre: Array = frame.R.T @ (self.by_joint[row, 1:4] / self.by_joint[row, 0] - frame.p)
+        return centre
 
     @property
     def moved_mass(self) -> float:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -677,7 +677,7 @@ def _require_joints(description: Description, drives: tuple[str, ...],
     for name in drives:
         if name not in joints:
             raise ModelError(listed, name, 'be joints of the URDF: '
-                             f'{", ".join(moving[:40]) or MISSING}')
+                             f'{", ".join(moving[:40]) or "none"}')
         joint = joints[name]
         if joint.kind not in (*TURNING, PRISMATIC):
             raise ModelError(listed, name, 'be revolute, continuous or prismatic, but is of the '

@@ -60,7 +60,7 @@ PAPER = RobotNames(DRIVES, BASE)
 
 
 def write_trajectory(
-    motion: PlatformMotion, stamp: Time, offsets: Sequence[int], frame: str = BASE,
+    motion: PlatformMotion, stamp: Time, offsets: Sequence[int],
 ) -> MultiDOFJointTrajectory:
     """Return the message that asks for a platform motion.
 
@@ -70,10 +70,9 @@ def write_trajectory(
     stamp : builtin_interfaces/Time
     offsets : sequence of int
         time_from_start of every point [ns].
-    frame : str, optional
     """
     message = MultiDOFJointTrajectory(joint_names=[PLATFORM])
-    message.header.stamp, message.header.frame_id = stamp, frame
+    message.header.stamp, message.header.frame_id = stamp, BASE
     for sample, offset in enumerate(offsets):
         x, y, z, w = motion.orientation[sample].tolist()
         message.points.append(MultiDOFJointTrajectoryPoint(
