@@ -40,8 +40,9 @@ setup(
     maintainer_email=MAINTAINER.get('email'),
     project_urls={url.get('type'): url.text for url in DESCRIPTION.findall('url')},
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed', 'config/*.yaml', 'config/*.urdf', 'app/browser/*',
-                                 'app/report/plotly-basic.*', 'app/report/uplot.*']},
+    package_data={package_name: ['py.typed', '__init__.pyi', 'config/*.yaml', 'config/*.urdf',
+                                 'app/browser/*', 'app/report/plotly-basic.*',
+                                 'app/report/uplot.*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
