@@ -18,16 +18,7 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.drive_model import Margins, margins
-from pprs_dynamics.ros.force_command import (
-    HOLD_GRAVITY,
-    SHORTEST_STOP,
-    SILENT,
-    DriveTrajectory,
-    Feedforward,
-    ForceCommand,
-    parameters_for,
-    warn_without_limits,
-)
+from pprs_dynamics.ros import force_command
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames, efforts, joint_state
 from pprs_dynamics.ros.messages.incoming_bytes import only_whole
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
@@ -73,7 +64,7 @@ class FeedforwardNode(ManagedNode):
         self._parts: dict[str, Any] = {}
         self._current: Any = None
         self._watchdog: CommandWatchdog | None = None
-        parameters = parameters_for(drive_count(self))
+        parameters = force_command.parameters_for(drive_count(self))
         self._settings = ModelParameters(
             self, arguments, parameters, self._use_settings, drives=True)
         node_values = self._settings.node_values
@@ -84,13 +75,14 @@ class FeedforwardNode(ManagedNode):
         self._names = names = RobotNames.of(self._settings.model, node_values['frame_id'])
         self._readers = readers_for(self._settings.model, names)
         self._controller = ControllerWatch(names.joints)
-        self._feedforward = Feedforward(self._settings.model, node_values)
+        self._feedforward = force_command.Feedforward(self._settings.model, node_values)
         self._timing = Timing.of(node_values)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._senders = Senders()
         self._margins_due, self._margins, self._beyond_curve = 0.0, Margins(None, 1.0, ''), ''
-        self._last_unchecked: ForceCommand | None = None  # when its margins were not due
+        # When its margins were not due.
+        self._last_unchecked: force_command.ForceCommand | None = None
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
         self._status = StatusReporter(
@@ -106,15 +98,16 @@ class FeedforwardNode(ManagedNode):
         model = self._settings.model
         self.get_logger().info(
             f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
-        warn_without_limits(self, model, self._settings.node_values)
+        force_command.warn_without_limits(self, model, self._settings.node_values)
         return super().on_activate(state)
 
     def _create_topics(self) -> None:
         # The last trajectory for a controller, and whether there was ever one.
-        self._sent: DriveTrajectory | None = None
+        self._sent: force_command.DriveTrajectory | None = None
         self._has_sent = False
         # Its memory begins anew.
-        self._feedforward = Feedforward(self._settings.model, self._settings.node_values)
+        self._feedforward = force_command.Feedforward(self._settings.model,
+                                                      self._settings.node_values)
         self._commands = self._publisher(Float64MultiArray, '~/commands')
         self._joint_command = self._publisher(JointState, '~/joint_command')
         self._joint_trajectory = self._publisher(JointTrajectory, '~/joint_trajectory')
@@ -195,21 +188,21 @@ class FeedforwardNode(ManagedNode):
             self._lag.append(max(0.0, waited))
         self._report_condition(answer)
 
-    def _command(self, command: ForceCommand) -> None:
+    def _command(self, command: force_command.ForceCommand) -> None:
         """Send efforts to the drives, and the currents that give them where they are known."""
         effort = command.effort[0]
         self._commands.publish(efforts(effort))
         if self._current is not None:
             self._current.publish(efforts(self._settings.model.currents(effort)))
 
-    def _send_setpoint(self, command: ForceCommand, stamp: int) -> None:
+    def _send_setpoint(self, command: force_command.ForceCommand, stamp: int) -> None:
         """Send positions, velocities and efforts of a time [ns] as one setpoint."""
         if self._joint_command.get_subscription_count():
             position, velocity, _ = command.forces.drive_motion
             self._joint_command.publish(joint_state(
                 stamp, command.effort[0], position[0], velocity[0], self._names))
 
-    def _publish_rest(self, answer: ForceCommand) -> None:
+    def _publish_rest(self, answer: force_command.ForceCommand) -> None:
         request = answer.request
         self._send_setpoint(answer, request.first_stamp)
         self._sent = None
@@ -229,7 +222,7 @@ class FeedforwardNode(ManagedNode):
                 topic.publish(joint_state(
                     request.first_stamp, self._feedforward.part(answer, name), names=self._names))
 
-    def _report_condition(self, answer: ForceCommand) -> None:
+    def _report_condition(self, answer: force_command.ForceCommand) -> None:
         node_values, report, now = self._settings.node_values, self._status.report, time.monotonic()
         self._last_unchecked = None if now > self._margins_due else answer
         if self._last_unchecked is None:
@@ -284,10 +277,10 @@ class FeedforwardNode(ManagedNode):
         """Let a controller hold with gravity where it would hold without."""
         self._controller.heard(state, self._has_sent)
         if (self._watchdog is not None and self.state == 'active' and not self._watchdog.fresh
-                and self._settings.node_values['timeout_action'] == HOLD_GRAVITY):
+                and self._settings.node_values['timeout_action'] == force_command.HOLD_GRAVITY):
             hold_controller(self, self._controller, self._feedforward.hold_at, self._send_hold)
 
-    def _send_hold(self, held: DriveTrajectory) -> None:
+    def _send_hold(self, held: force_command.DriveTrajectory) -> None:
         """Let the trajectory controller hold a pose at rest from now on."""
         self._sent = held
         self._joint_trajectory.publish(held.message(0, self._names))
@@ -336,9 +329,9 @@ class FeedforwardNode(ManagedNode):
         """
         action = self._settings.node_values['timeout_action']
         left = 0 if self._watchdog is None else self._watchdog.left
-        if action == SILENT:
+        if action == force_command.SILENT:
             return 'nothing is published, the last command remains in force'
-        gravity = action == HOLD_GRAVITY
+        gravity = action == force_command.HOLD_GRAVITY
         try:
             held = self._feedforward.hold(gravity, left)
             setpoint = self._feedforward.hold_setpoint(gravity)
@@ -352,7 +345,7 @@ class FeedforwardNode(ManagedNode):
         done = f'{pose} is held at rest' if gravity else 'efforts are zero'
         return (f'{done}, without {", ".join(failed)}' if gravity and failed else done) + controller
 
-    def _end_trajectory(self, held: ForceCommand, left: int, gravity: bool) -> str:
+    def _end_trajectory(self, held: force_command.ForceCommand, left: int, gravity: bool) -> str:
         """Let the trajectory controller come to rest on its path; return how, in words.
 
         A controller that holds a trajectory which ends at rest gets nothing: any other message
@@ -364,14 +357,15 @@ class FeedforwardNode(ManagedNode):
             if self._sent.ends_at_rest:
                 return '; a trajectory controller completes its trajectory, which ends at rest'
             stop_time = self._settings.node_values['stop_time']
-            if stop_time < SHORTEST_STOP:
+            if stop_time < force_command.SHORTEST_STOP:
                 stop_time = STOP_TIME
             self._sent = self._feedforward.stop(left, stop_time, gravity)
             self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'
         if not self._sent.ends_as(held):
             # At its present position: beyond the last pose, if a stop was added to the path.
-            self._send_hold(DriveTrajectory.holding(self._sent.drive_motion, held.effort))
+            self._send_hold(
+                force_command.DriveTrajectory.holding(self._sent.drive_motion, held.effort))
         return ''
 
     # --- status ---------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.simulation import injection
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injected_forms import (
@@ -34,20 +35,6 @@ from pprs_dynamics.simulation.injected_forms import (
     JointMoment,
     draw_form,
     draw_temperatures,
-)
-from pprs_dynamics.simulation.injection import (
-    BODIES,
-    RANDOM,
-    Choice,
-    Injected,
-    Injecting,
-    draw_motion,
-    guides,
-    links_that_weigh,
-    named,
-    one_able_joint,
-    own_joint_friction,
-    require_tool,
 )
 
 LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1 ms of processor time, for real time
@@ -74,7 +61,7 @@ class UnsolvedError(PprsError, ArithmeticError):
                          'be such as a mechanism can have')
 
 
-class Plant(Injecting):
+class Plant(injection.Injecting):
     """A robot under efforts of its drives; it starts at home, an arm amid its ranges.
 
     Parameters
@@ -122,12 +109,12 @@ class Plant(Injecting):
         self.model = model
         self.engine = MechanismEngine(model)
         self.structure = s = model.robot.structure
-        self._nominal = draw_motion(self.model, NOMINAL, 0)
+        self._nominal = injection.draw_motion(self.model, NOMINAL, 0)
         self._efforts = self.engine.torques(self._nominal)
         self.largest = np.abs(self._efforts).max(axis=0)
-        self._guides = sorted(guides(self.model), key=s.drives.index)
+        self._guides = sorted(injection.guides(self.model), key=s.drives.index)
         self._offset, self._width = model.offset, model.reversal.widths(len(s.drives))
-        self._friction = own_joint_friction(model)
+        self._friction = injection.own_joint_friction(model)
         self.inject(names, seed, scale)
         home, _ = s.room(np.pi)  # where motions that are drawn begin
         self.limits = self.model.limits
@@ -168,30 +155,33 @@ class Plant(Injecting):
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.injected: list[dict[str, Any]] = []
         for choice in chosen:
-            self.injected.append(self.inject_one(choice, BODIES.get(choice.name, Plant._push)))
+            effect = injection.BODIES.get(choice.name, Plant._push)
+            self.injected.append(self.inject_one(choice, effect))
 
-    def choices(self, names: Sequence[str], seed: int, scale: float) -> list[Choice]:
+    def choices(self, names: Sequence[str], seed: int, scale: float) -> list[injection.Choice]:
         """Return the effects of names without injecting them; see `inject`."""
         chosen = []
         for words in names:
-            if words == RANDOM:
+            if words == injection.RANDOM:
                 words = str(np.random.default_rng(seed).choice(sorted(INJECTED)))
-            choice = named(words, np.random.default_rng((seed, zlib.crc32(words.encode()))), scale)
+            random = np.random.default_rng((seed, zlib.crc32(words.encode())))
+            choice = injection.named(words, random, scale)
             choice.require(INJECTED, self.structure.drives)
             if choice.name in OF_MOMENT:
-                one_able_joint(choice.name, self.model, self._nominal, np.random.default_rng(0))
+                injection.one_able_joint(
+                    choice.name, self.model, self._nominal, np.random.default_rng(0))
             elif choice.name == 'link_mass':
-                links_that_weigh(self.model)
+                injection.links_that_weigh(self.model)
             elif choice.name == 'base_tilt':
-                require_tool(self.model, choice.name)
+                injection.require_tool(self.model, choice.name)
             chosen.append(choice)
         return chosen
 
-    def _push(self) -> Injected:
+    def _push(self) -> injection.Injected:
         """Inject a force on drives."""
         name, random = self.choice.name, self.random
         model, motion, form = self.model, self._nominal, OF_MOMENT[name]
-        chosen = self.given or [one_able_joint(name, model, motion, random)]
+        chosen = self.given or [injection.one_able_joint(name, model, motion, random)]
         assert motion.time is not None
         temperature = draw_temperatures(random, motion.time, motion.velocity)
         parameters = {}

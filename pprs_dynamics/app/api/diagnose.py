@@ -12,19 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.app.report import figures
+from pprs_dynamics.app.report import figures, terminal
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import plot_errors
-from pprs_dynamics.app.report.terminal import (
-    PlainTable,
-    escape,
-    plain_rows,
-    shell_command,
-    stacked,
-    text_table,
-    verdict_panel,
-)
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis import sentences
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect, RivalEffect
@@ -35,18 +27,6 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     name_drives,
     plain,
     sentence,
-)
-from pprs_dynamics.inference.diagnosis.sentences import (
-    Finding,
-    Sentences,
-    detectable_rows,
-    largest_fall,
-    runner_up,
-    set_rows,
-    unexplained_groups,
-    word_detectable,
-    word_diagnosis,
-    word_values,
 )
 from pprs_dynamics.inference.residuals.residuals import rms, rms_by_drive
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -70,11 +50,11 @@ METHOD = (
     'The evidence of an effect is the cost of the best set without it minus the cost of the '
     'reported set.')
 
-TitledTable = tuple[str, str, PlainTable]
+TitledTable = tuple[str, str, terminal.PlainTable]
 """Title, note, and headings with rows."""
 
 
-def diagnosis_view(diagnosis: Diagnosis, words: Sentences, next_step: bool = True) -> Any:
+def diagnosis_view(diagnosis: Diagnosis, words: sentences.Sentences, next_step: bool = True) -> Any:
     """Return the diagnosis for the terminal, most important first, in at most 25 lines.
 
     Parameters
@@ -85,35 +65,36 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, next_step: bool = Tru
     next_step : bool
         Whether the next command is printed.
     """
-    parts = [verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline),
-             *(f'[blue]i[/] {escape(text)}' for text in words.reference),
+    parts = [terminal.verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline),
+             *(f'[blue]i[/] {terminal.escape(text)}' for text in words.reference),
              *_brief(diagnosis, words)]
     if next_step:
-        parts.append(f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}')
-        parts += [shell_command(words.command)] if words.command else []
-    return stacked(*parts, ELSEWHERE)
+        parts.append(
+            f'[bold]Next[/] {terminal.escape(words.following)}{":" if words.command else ""}')
+        parts += [terminal.shell_command(words.command)] if words.command else []
+    return terminal.stacked(*parts, ELSEWHERE)
 
 
-def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+def _brief(diagnosis: Diagnosis, words: sentences.Sentences) -> Iterator[Any]:
     """Yield the first effects with their values, the runner-up and the first warning."""
     if diagnosis.effects:
         rows, values = effect_rows(diagnosis), value_rows(diagnosis)
-        yield text_table(*plain_rows((HEADINGS, rows[:MOST_EFFECTS])), right=(2, 3, 4),
-                         whole=(0, 3, 4), frame='none')
+        yield terminal.text_table(*terminal.plain_rows((HEADINGS, rows[:MOST_EFFECTS])),
+                                  right=(2, 3, 4), whole=(0, 3, 4), frame='none')
         for effect, drive, text in values[:MOST_EFFECTS]:
-            yield escape(f'  {f"{effect} on {drive}" if drive else effect}: {text}')
+            yield terminal.escape(f'  {f"{effect} on {drive}" if drive else effect}: {text}')
         if len(rows) > MOST_EFFECTS or len(values) > MOST_EFFECTS:
             yield f'  … all {len(rows)} rows and {len(values)} lines of values: --report FILE.html'
     for statement in diagnosis.depends_on[:MOST_PLACES]:
-        yield escape(f'  {statement.text}')
-    if second := runner_up(diagnosis):
-        yield f'[bold]Runner-up[/] {escape(second)}'
-    if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
-        yield escape(seen)
+        yield terminal.escape(f'  {statement.text}')
+    if second := sentences.runner_up(diagnosis):
+        yield f'[bold]Runner-up[/] {terminal.escape(second)}'
+    if diagnosis.verdict == 'adequate' and (seen := sentences.word_detectable(diagnosis)):
+        yield terminal.escape(seen)
     if words.refuted:
-        yield f'[blue]i[/] {escape(words.refuted[0])}'
+        yield f'[blue]i[/] {terminal.escape(words.refuted[0])}'
     if words.warnings:
-        yield f'[yellow]![/] {escape(words.warnings[0])}'
+        yield f'[yellow]![/] {terminal.escape(words.warnings[0])}'
 
 
 def _values(diagnosis: Diagnosis) -> Iterator[TitledTable]:
@@ -128,7 +109,7 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
                'A cost of 10 is odds of 150 to 1. Terms: fit = misfit; coefficients = prior; '
                'others = model choices.',
                (('cost', 'set', 'terms'),
-                [(cost, text, why) for text, cost, why in set_rows(diagnosis)]))
+                [(cost, text, why) for text, cost, why in sentences.set_rows(diagnosis)]))
     if diagnosis.candidates:
         yield ('Each effect alone', 'An evidence of 0 is the threshold.',
                (('effect', 'evidence', f'error after [{diagnosis.residuals.unit}]', 'on'),
@@ -137,13 +118,13 @@ def _alternatives(diagnosis: Diagnosis) -> Iterator[TitledTable]:
 
 
 def _unseen(diagnosis: Diagnosis) -> Iterator[TitledTable]:
-    if rows := detectable_rows(diagnosis):
+    if rows := sentences.detectable_rows(diagnosis):
         yield ('Smallest effects that would have been reported', 'Each of them '
                'alone would have lowered the cost by 10.',
                (('effect', 'size'), rows))
 
 
-def _lists(words: Sentences) -> list[tuple[str, Sequence[str]]]:
+def _lists(words: sentences.Sentences) -> list[tuple[str, Sequence[str]]]:
     return [('Suspects: effects that cost little more than they explain', words.suspects),
             ('Not confirmed', words.refuted),
             ('Calibrated numbers of the model', words.calibrated)]
@@ -160,18 +141,19 @@ def effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
 
 def _fall(diagnosis: Diagnosis, error: Array, less: Array) -> str:
     """Return 'slide_1 0.172 → 0.0145 N', see `largest_fall`."""
-    drive, *errors = largest_fall(diagnosis, error, less)
+    drive, *errors = sentences.largest_fall(diagnosis, error, less)
     return f'{drive} {fall(*errors)} {diagnosis.residuals.units_of(drive).effort}'
 
 
 def value_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return effect, drive and fitted values, a row for each effect and drive."""
     return [(effect.name, drive, text) for effect in diagnosis.effects
-            for drive, text in word_values(effect.effect, effect.parameters, effect.moments,
-                                           diagnosis.residuals.drives).items()]
+            for drive, text in sentences.word_values(
+                effect.effect, effect.parameters, effect.moments,
+                diagnosis.residuals.drives).items()]
 
 
-def finding_lines(finding: Finding) -> list[tuple[str, str]]:
+def finding_lines(finding: sentences.Finding) -> list[tuple[str, str]]:
     """Return labelled lines of a finding, without the test that confirms it."""
     return [('finding', finding.what), ('why', finding.why), ('cause', finding.cause),
             *(('note', remark) for remark in finding.remarks)]
@@ -186,7 +168,7 @@ def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
 
 
 def diagnosis_page(
-    diagnosis: Diagnosis, words: Sentences, recordings: Sequence[str],
+    diagnosis: Diagnosis, words: sentences.Sentences, recordings: Sequence[str],
     validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
 ) -> Page:
     """Return the page: the result on one screen, then evidence, confirmation and alternatives.
@@ -281,16 +263,17 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
             diagnosis, diagnosis.effects[0], diagnosis.remaining)[0])
 
 
-def _card(page: Page, diagnosis: Diagnosis, finding: Finding, effect: FoundEffect,
+def _card(page: Page, diagnosis: Diagnosis, finding: sentences.Finding, effect: FoundEffect,
           remaining: Array) -> None:
     first, *rest = finding_lines(finding)
     page.card([first, ('equation', effect.effect.card.equation), ('looks like', finding.mark),
                *rest], figures.effect_pictures(diagnosis, effect, remaining))
 
 
-def _unexplained(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
+def _unexplained(page: Page, diagnosis: Diagnosis, words: sentences.Sentences) -> None:
     """Add a card with pictures for each pattern that no effect explains."""
-    for finding, group in zip(words.unexplained, unexplained_groups(diagnosis), strict=True):
+    for finding, group in zip(
+            words.unexplained, sentences.unexplained_groups(diagnosis), strict=True):
         pictures = [(figures.unknown_picture(diagnosis, statement), sentence(statement.text))
                     for statement in group]
         with page.fold(capitalised(finding.title)):
@@ -358,7 +341,7 @@ class DiagnosisResult(Result):
 
     @cached_property
     def _words(self) -> Any:
-        return word_diagnosis(self.diagnosis, self.inputs.files, self._rivals)
+        return sentences.word_diagnosis(self.diagnosis, self.inputs.files, self._rivals)
 
 
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,

@@ -27,6 +27,7 @@ from pprs_dynamics.inference.diagnosis.statements import Statement, word_stateme
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import rms
+from pprs_dynamics.inference.search import fitted_model
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
@@ -38,13 +39,6 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import Estimates, averaged, calibrations, estimate
 from pprs_dynamics.inference.search.explained_effort import little_explained
-from pprs_dynamics.inference.search.fitted_model import (
-    friction_forms,
-    linear_error,
-    linear_residual,
-    model_at,
-    parts_of,
-)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import (
     HeldOut,
@@ -69,8 +63,8 @@ def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     ModelError
         For values that no model may have.
     """
-    base, placed = parts_of(fits, fitted)
-    return model_at(fits.design, base, [effect for effect, component in zip(
+    base, placed = fitted_model.parts_of(fits, fitted)
+    return fitted_model.model_at(fits.design, base, [effect for effect, component in zip(
         placed, fitted.blocks, strict=True)
         if component.course is None or component.course.kind == SINCE])
 
@@ -110,7 +104,7 @@ class Answer:
     def _remaining(self) -> Array:
         """Return measured minus what the reported model predicts, (M, D) [N]."""
         if self.fitted.is_dated:
-            return linear_residual(self.fits, self.fitted)
+            return fitted_model.linear_residual(self.fits, self.fitted)
         remaining = self.given.measured - self.design.exact_forces(
             self.adopted) - self.design.carried_forces(self.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
@@ -226,7 +220,7 @@ class Answer:
         The form error is a share of the sum of forces: two that cancel are no force of a machine.
         Its size is that which 99 of 100 form errors do not exceed: half of them exceed a mean.
         """
-        found, residual = {}, self.remaining - friction_forms(self.fits, self.fitted)
+        found, residual = {}, self.remaining - fitted_model.friction_forms(self.fits, self.fitted)
         forms = sum((self.force(candidate) for candidate in self.fitted.effects
                      if candidate.effect.idealised), np.zeros_like(residual))
         for d in self.fits.regression.drives:
@@ -290,7 +284,8 @@ class Answer:
         first = self.table.first
         none = first.evaluate(()).terms
         return tuple(EffectAlone(candidate.name, self.design.named(candidate.drives),
-                                 (none - fitted.terms).total, linear_error(first, fitted))
+                                 (none - fitted.terms).total,
+                                 fitted_model.linear_error(first, fitted))
                      for fitted in self.table.alone.values() for candidate in fitted.candidates)
 
     def _suspects(self) -> tuple[EffectAlone, ...]:

@@ -14,15 +14,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, optional_library
+from pprs_dynamics.measurement.files import joint_states
 from pprs_dynamics.measurement.files.bag_storage import Bag, opened_bag
-from pprs_dynamics.measurement.files.joint_states import (
-    CONTROLLER,
-    DYNAMIC,
-    JOINT_STATE,
-    channel_of,
-    message_types,
-    states_of,
-)
 from pprs_dynamics.measurement.files.merged_states import Key, Signal, States, fields_of
 from pprs_dynamics.measurement.files.name_hints import MOST, missing_names
 from pprs_dynamics.measurement.files.samples import (
@@ -41,7 +34,7 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
 
 LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
-CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
+CONTROLLER_TYPES = (joint_states.DYNAMIC, joint_states.CONTROLLER)
 TOPIC_END = 'joint_states'
 # In the names of topics whose positions were commanded, not measured.
 COMMANDS = 'command', 'cmd', 'desired', 'reference', 'target', 'goal', 'setpoint'
@@ -76,8 +69,8 @@ def read_bag(
         states.collect(bag, [c for c in bag.connections
                              if c not in main and _has_channels(bag, c)], channels=True)
         found = states.signals(first, path)
-        others = [c for c in bag.connections if c.msgtype == JOINT_STATE
-                  and c.topic != first and channel_of(c.topic, c.msgtype) is None]
+        others = [c for c in bag.connections if c.msgtype == joint_states.JOINT_STATE
+                  and c.topic != first and joint_states.channel_of(c.topic, c.msgtype) is None]
         if others and not (topic or fields or _have_efforts(found)):
             states.collect(bag, others)
             with_others = states.signals(first, path)
@@ -90,10 +83,10 @@ def _have_efforts(signals: Mapping[Key, Signal]) -> bool:
 
 
 def _has_channels(bag: Bag, connection: Connection) -> bool:
-    if connection.msgtype != DYNAMIC:
-        return channel_of(connection.topic, connection.msgtype) is not None
+    if connection.msgtype != joint_states.DYNAMIC:
+        return joint_states.channel_of(connection.topic, connection.msgtype) is not None
     return any(quantity in CHANNELS for *_, message in bag.decoded([connection], 1)
-               for _, quantity, *_ in states_of(message, DYNAMIC))
+               for _, quantity, *_ in joint_states.states_of(message, joint_states.DYNAMIC))
 
 
 def _samples(path: Path, recorded: RecordedDrives, states: States,
@@ -200,7 +193,7 @@ def _stamps(samples: Samples) -> Indices:
 def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[str, Sequence[str]],
                      suffix: str) -> None:
     rosbag2 = optional_library('rosbags.rosbag2', 'rosbags', 'writing bags', 'bags')
-    typestore = message_types()
+    typestore = joint_states.message_types()
     starts = [int(_stamps(samples).min()) for samples in topics.values() if len(samples.time)]
     plugin = rosbag2.StoragePlugin[STORAGE[suffix]]
     with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
@@ -228,7 +221,7 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
 def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, stamps: Indices,
                   recorded: Indices) -> None:
     """Write samples as joint states, with stamps in their headers and as they are recorded."""
-    connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
+    connection = writer.add_connection(topic, joint_states.JOINT_STATE, typestore=typestore)
     types = typestore.types
     none = np.empty((len(stamps), 0))
     quantities = [np.ascontiguousarray(none if values is None else values, dtype=float)
@@ -236,14 +229,14 @@ def _write_states(writer: Any, typestore: Any, topic: str, samples: Samples, sta
     for stamp, at, *values in zip(stamps.tolist(), recorded.tolist(), *quantities, strict=True):
         header = types['std_msgs/msg/Header'](
             types['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9)), '')
-        message = types[JOINT_STATE](header, list(samples.drives), *values)
-        writer.write(connection, at, typestore.serialize_cdr(message, JOINT_STATE))
+        message = types[joint_states.JOINT_STATE](header, list(samples.drives), *values)
+        writer.write(connection, at, typestore.serialize_cdr(message, joint_states.JOINT_STATE))
 
 
 def _has_efforts(bag: Bag, connections: list[Connection], drives: tuple[str, ...]) -> bool:
     """Return whether the first messages of a topic have positions of all drives, and efforts."""
     states = [(joint, quantity, value) for connection, _, message in bag.decoded(
-        connections, FIRST) for joints, quantity, values, _ in states_of(
+        connections, FIRST) for joints, quantity, values, _ in joint_states.states_of(
             message, connection.msgtype) for joint, value in zip(joints, values, strict=True)
         if np.isfinite(value)]
     known = {(joint, quantity) for joint, quantity, _ in states}
@@ -260,10 +253,10 @@ def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connec
     or none, the one that ends in `joint_states`.
     """
     path = bag.path
-    states = [item for item in bag.connections if item.msgtype == JOINT_STATE]
+    states = [item for item in bag.connections if item.msgtype == joint_states.JOINT_STATE]
     topics: dict[str, list[Connection]] = {}
     for item in sorted(bag.connections, key=lambda item: item.topic):
-        if item.msgtype == JOINT_STATE or (
+        if item.msgtype == joint_states.JOINT_STATE or (
                 item.msgtype in CONTROLLER_TYPES and item.msgcount and (topic or not states)):
             topics.setdefault(item.topic, []).append(item)
     if topic is not None:
@@ -275,7 +268,8 @@ def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connec
     elif not states and len(topics) == 1:
         matching = [*topics]
     else:
-        measured = [name for name in topics if channel_of(name, JOINT_STATE) is None]
+        measured = [name for name in topics
+                    if joint_states.channel_of(name, joint_states.JOINT_STATE) is None]
         named = [name for name in measured if name.endswith(TOPIC_END)]
         whole = [name for name in measured if not any(word in name.lower() for word in COMMANDS)
                  and _has_efforts(bag, topics[name], drives)] if len(measured) > 1 else []

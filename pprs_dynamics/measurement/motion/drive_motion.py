@@ -13,15 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.measurement.motion.differentiation import (
-    SHORTEST_WINDOW,
-    LocalPolynomial,
-    Smoothing,
-    Stretch,
-    better_recorded,
-    choose_smoothing,
-    representative,
-)
+from pprs_dynamics.measurement.motion import differentiation
 from pprs_dynamics.measurement.motion.sampling_grid import SamplingGrid, find_grid
 from pprs_dynamics.measurement.motion.treatment import (
     block_duration,
@@ -70,7 +62,7 @@ class DriveMotion:
     segments: tuple[slice, ...]
     block_starts: np.ndarray
     block: int
-    smoothing: Smoothing
+    smoothing: differentiation.Smoothing
     grids: tuple[SamplingGrid, ...]
     from_recorded: np.ndarray
     notes: tuple[str, ...]
@@ -95,17 +87,18 @@ def smooth_drives(recording: Recording, blocks_per_period: float = 0.0, unit: st
     """
     if recording.are_poses:
         return _held_poses(recording)
-    segments = [part for part in recording.segments if part.stop - part.start > 2 * SHORTEST_WINDOW]
+    segments = [part for part in recording.segments
+                if part.stop - part.start > 2 * differentiation.SHORTEST_WINDOW]
     if not segments:
         raise MotionError(
             'recording', f'its {len(recording.segments)} segments have at most '
             f'{max((s.stop - s.start for s in recording.segments), default=0)} samples',
-            f'have more than {2 * SHORTEST_WINDOW} without a gap', 'shape')
+            f'have more than {2 * differentiation.SHORTEST_WINDOW} without a gap', 'shape')
     grids, told = _grids(recording, segments)
-    stretches = representative([_stretch(recording, part, grid)
-                                for part, grid in zip(segments, grids, strict=True)])
-    smoothing = choose_smoothing(stretches, unit)
-    recorded = better_recorded(stretches, smoothing)
+    stretches = differentiation.representative([
+        _stretch(recording, part, grid) for part, grid in zip(segments, grids, strict=True)])
+    smoothing = differentiation.choose_smoothing(stretches, unit)
+    recorded = differentiation.better_recorded(stretches, smoothing)
     notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
 
     duration = block_duration(motion_bandwidth(stretches, smoothing) if blocks_per_period
@@ -154,7 +147,7 @@ def _held_poses(recording: Recording) -> DriveMotion:
     return DriveMotion(
         position, still, still, index, (slice(0, len(index)),),
         firsts, int(lengths.max()),
-        Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
+        differentiation.Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
         (SamplingGrid(step, np.arange(len(index), dtype=float)),),
         np.zeros((2, position.shape[1]), dtype=bool), ())
 
@@ -175,8 +168,8 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
     """
     if not motion.smoothing.duration:  # poses that are held
         return replace(motion, position=made(motion.position))
-    smoothing = choose_smoothing(representative([
-        Stretch(made(grid.at_steps(recording.position[part])), grid.step)
+    smoothing = differentiation.choose_smoothing(differentiation.representative([
+        differentiation.Stretch(made(grid.at_steps(recording.position[part])), grid.step)
         for grid, part in zip(motion.grids, _segments_of(motion, recording), strict=True)]))
     q, q_dot, q_ddot = smoothed_as(motion, recording, made, smoothing)
     from_velocity, from_acceleration = motion.from_recorded
@@ -186,7 +179,7 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
 
 
 def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array], Array],
-                smoothing: Smoothing | None = None) -> tuple[Array, Array, Array]:
+                smoothing: differentiation.Smoothing | None = None) -> tuple[Array, Array, Array]:
     """Return values made of positions, and their rates, (N, D) each, smoothed as positions are.
 
     Parameters
@@ -229,8 +222,8 @@ def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array
     return q, q_dot, q_ddot
 
 
-def _differentiated(values: Array, grid: SamplingGrid, filter_: LocalPolynomial, samples: slice,
-                    ) -> list[Array]:
+def _differentiated(values: Array, grid: SamplingGrid, filter_: differentiation.LocalPolynomial,
+                    samples: slice) -> list[Array]:
     """Return values at equal steps, and their rates, at the samples of a recording."""
     return [grid.at_samples(rate, filter_.half, samples) for rate in filter_.differentiated(values)]
 
@@ -255,7 +248,7 @@ def _grids(recording: Recording, segments: Sequence[slice]) -> tuple[list[Sampli
     return grids, sayings
 
 
-def _stretch(recording: Recording, part: slice, grid: SamplingGrid) -> Stretch:
+def _stretch(recording: Recording, part: slice, grid: SamplingGrid) -> differentiation.Stretch:
     velocity = None
     if recording.velocity is not None:
         # A drive with a velocity that is missing anywhere is not considered; a spline through
@@ -264,7 +257,7 @@ def _stretch(recording: Recording, part: slice, grid: SamplingGrid) -> Stretch:
         complete = np.isfinite(known).all(axis=0)
         velocity = grid.at_steps(np.where(complete, known, 0.0))
         velocity = np.where(complete, velocity, np.nan)
-    return Stretch(grid.at_steps(recording.position[part]), grid.step, velocity)
+    return differentiation.Stretch(grid.at_steps(recording.position[part]), grid.step, velocity)
 
 
 def _velocity_notes(recording: Recording, recorded: np.ndarray) -> list[str]:

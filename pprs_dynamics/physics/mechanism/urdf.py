@@ -21,29 +21,14 @@ from typing import TypeVar
 import numpy as np
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.physics.mechanism.description import (
-    CONTINUOUS,
-    FIXED,
-    FLOATING,
-    PARAMETERS,
-    PRISMATIC,
-    REVOLUTE,
-    TURNING,
-    Description,
-    Frame,
-    Joint,
-    Mimic,
-    Transmission,
-    body_at,
-    principal_inertia,
-    rotation_of,
-)
+from pprs_dynamics.physics.mechanism import description
 from pprs_dynamics.system.files import readable, require_file
 
 WORLD = 'world'
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
 Item = TypeVar('Item')
-KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
+KINDS = (description.REVOLUTE, description.CONTINUOUS, description.PRISMATIC, description.FIXED,
+         description.FLOATING)
 # Macros, and expressions in attributes, as xacro has them.
 # Its output keeps the comments, with what was commented out.
 COMMENT = re.compile(rb'<!--.*?-->', re.DOTALL)
@@ -69,7 +54,7 @@ def read_content(path: str) -> bytes:
         return file.read_bytes()
 
 
-def read_urdf(path: str) -> Description:
+def read_urdf(path: str) -> description.Description:
     """Return the description in a URDF file.
 
     Raises
@@ -96,7 +81,7 @@ def urdf_content(path: str) -> bytes:
 
 
 @lru_cache(maxsize=16)
-def _described(content: bytes, path: str) -> Description:
+def _described(content: bytes, path: str) -> description.Description:
     try:
         robot = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -106,7 +91,8 @@ def _described(content: bytes, path: str) -> Description:
     links = _read(path, robot.findall('link'), _inertial)
     joints = _read(path, robot.findall('joint'), _joint)
     if any(joint.parent == WORLD for joint in joints.values()):
-        links.setdefault(WORLD, np.zeros(PARAMETERS))  # Drake reads it without a link of its own
+        # Drake reads it without a link of its own.
+        links.setdefault(WORLD, np.zeros(description.PARAMETERS))
     _require_tree(path, links, joints)
     try:
         transmissions = tuple(map(_transmission, robot.findall('transmission')))
@@ -114,18 +100,18 @@ def _described(content: bytes, path: str) -> Description:
         raise UnreadableFileError(path, str(error)) from None
     for gear in transmissions:
         for name in gear.joints if gear.reduction else ():
-            if name in joints and joints[name].kind in TURNING:
+            if name in joints and joints[name].kind in description.TURNING:
                 joints[name] = replace(joints[name], reduction=gear.reduction)
     if (loop := robot.find('constraint')) is not None:
         raise UnreadableFileError(path, f'holds <constraint name="{loop.get("name", "")}">, which '
                                   'no URDF has: write it under robot.loops of the model file')
-    return Description(path, links, joints, hashlib.sha256(content).hexdigest(),
-                       remarks=tuple(_unused(robot, joints, transmissions)),
-                       transmissions=transmissions,
-                       faults=tuple(_impossible_bodies(links, joints)))
+    return description.Description(
+        path, links, joints, hashlib.sha256(content).hexdigest(),
+        remarks=tuple(_unused(robot, joints, transmissions)), transmissions=transmissions,
+        faults=tuple(_impossible_bodies(links, joints)))
 
 
-def _transmission(element: ElementTree.Element) -> Transmission:
+def _transmission(element: ElementTree.Element) -> description.Transmission:
     kind = next((text.strip() for text in (element.findtext('type'), element.get('type'),
                                            element.findtext('plugin')) if text), '')
     reductions = [found.text or '' for side in ('joint', 'actuator') for tag in REDUCTIONS
@@ -139,11 +125,12 @@ def _transmission(element: ElementTree.Element) -> Transmission:
         if not 0 < reduction < np.inf:
             raise ValueError(f'the reduction of transmission {element.get("name", "")} is '
                              f'"{reductions[0]}", must be a number other than 0')
-    return Transmission(element.get('name', ''), kind, tuple(
+    return description.Transmission(element.get('name', ''), kind, tuple(
         joint.get('name', '') for joint in element.findall('joint')), reduction)
 
 
-def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -> Iterator[str]:
+def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, description.Joint],
+                       ) -> Iterator[str]:
     """Yield sentences on bodies whose inertia no body can have."""
     strokes = [joint.upper - joint.lower for joint in joints.values() if joint.kind == 'prismatic']
     reach = (sum(float(np.linalg.norm(joint.frame.p)) for joint in joints.values()) + sum(strokes)
@@ -154,7 +141,7 @@ def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -
             if np.any(parameters):
                 yield f'link {name} has inertia without mass: no body has'
             continue
-        mass, _, moments, _ = principal_inertia(parameters)
+        mass, _, moments, _ = description.principal_inertia(parameters)
         low, middle, high = np.sort(moments)
         listed = ', '.join(f'{value:.3g}' for value in (low, middle, high))
         if low < -ROUNDED * high or high > (1 + ROUNDED) * (low + middle) + TINY:
@@ -167,8 +154,8 @@ def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -
                    f'({1e-6 * high:.3g} kg m^2), or g mm^2?')
 
 
-def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
-            transmissions: tuple[Transmission, ...]) -> Iterator[str]:
+def _unused(robot: ElementTree.Element, joints: dict[str, description.Joint],
+            transmissions: tuple[description.Transmission, ...]) -> Iterator[str]:
     """Yield sentences on elements of the file that the model does not use."""
     carried = {joint.child for joint in joints.values()}
     hollow = [link.get('name', '') for link in robot.findall('link')
@@ -232,7 +219,7 @@ def _number(element: ElementTree.Element | None, key: str, default: float) -> fl
 def _inertial(link: ElementTree.Element) -> np.ndarray:
     inertial = link.find('inertial')
     if inertial is None:
-        return np.zeros(PARAMETERS)
+        return np.zeros(description.PARAMETERS)
     origin, inertia = inertial.find('origin'), inertial.find('inertia')
     if inertial.find('mass[@value]') is None:
         raise ValueError('<inertial> is without a <mass value="...">, must have one [kg]')
@@ -245,12 +232,12 @@ def _inertial(link: ElementTree.Element) -> np.ndarray:
     if max(mass, xx, yy, zz) > LARGEST_BODY:
         raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
                          f'{zz:g} kg m^2: none may be above {LARGEST_BODY:g}')
-    R = rotation_of(_numbers(origin, 'rpy', '0 0 0'))
+    R = description.rotation_of(_numbers(origin, 'rpy', '0 0 0'))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
+    return description.body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
 
 
-def _joint(joint: ElementTree.Element) -> Joint:
+def _joint(joint: ElementTree.Element) -> description.Joint:
     name, kind = joint.get('name', ''), joint.get('type', '')
     if kind not in KINDS:
         raise ValueError(f'its type is "{kind}", must be one of {", ".join(KINDS)}')
@@ -259,28 +246,29 @@ def _joint(joint: ElementTree.Element) -> Joint:
         raise ValueError('it is without <parent> or <child>, must have both')
     axis = np.array(_numbers(joint.find('axis'), 'xyz', '1 0 0'))
     length = float(np.linalg.norm(axis))
-    if kind not in (FIXED, FLOATING) and not length > 0:
+    if kind not in (description.FIXED, description.FLOATING) and not length > 0:
         raise ValueError('its axis has no length')
     limit, mimic = joint.find('limit'), joint.find('mimic')
     lower, upper = _number(limit, 'lower', 0.0), _number(limit, 'upper', 0.0)
-    if lower > upper and kind != CONTINUOUS:
+    if lower > upper and kind != description.CONTINUOUS:
         raise ValueError(f'its lower limit is {lower:g}, must be below its upper one, {upper:g}')
-    if not lower < upper or kind == CONTINUOUS:  # a URDF may omit them
+    if not lower < upper or kind == description.CONTINUOUS:  # a URDF may omit them
         lower, upper = -np.inf, np.inf
     speed, effort = (_number(limit, key, 0.0) or np.inf for key in ('velocity', 'effort'))
     if min(speed, effort) < 0:
         raise ValueError(f'its limits are {speed:g} of velocity and {effort:g} of effort, must be '
                          'at least 0')
-    return Joint(
+    return description.Joint(
         name, kind, parent.get('link', ''), child.get('link', ''),
-        Frame.of(_numbers(origin, 'xyz', '0 0 0'), _numbers(origin, 'rpy', '0 0 0')),
+        description.Frame.of(_numbers(origin, 'xyz', '0 0 0'), _numbers(origin, 'rpy', '0 0 0')),
         axis / length if length > 0 else axis, lower, upper, speed, effort,
-        None if mimic is None else Mimic(mimic.get('joint', ''),
-                                         _number(mimic, 'multiplier', 1.0),
-                                         _number(mimic, 'offset', 0.0)))
+        None if mimic is None else description.Mimic(
+            mimic.get('joint', ''), _number(mimic, 'multiplier', 1.0),
+            _number(mimic, 'offset', 0.0)))
 
 
-def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, Joint]) -> None:
+def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, description.Joint],
+                  ) -> None:
     """Raise UnreadableFileError where joints do not make one tree of the links.
 
     Nor may joints mimic one another in a ring.

@@ -17,29 +17,16 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect, find_parameter
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.keys import (
-    ADDED,
-    ANY,
-    NAMED,
-    NAMES,
-    NODE_KEYS,
-    NODE_PREFIXES,
-    Key,
-    below,
-    blocks_below,
-    is_described,
-    keys_of,
-    title_of,
-)
+from pprs_dynamics.physics.model import keys
 
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
 REFERENCE_KEYS = {
-    REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
-    HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
+    REFERENCE: keys.Key(REFERENCE, 'runs that pprs fit wrote', size=keys.ANY, is_text=True),
+    HASHES: keys.Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=keys.ANY, is_text=True)}
 UNCERTAINTIES = 'uncertainties'
 # Keys of the block `effects` that are no effect.
-ACTIVE = Key('effects.active', 'effects in force', size=ANY, is_text=True)
+ACTIVE = keys.Key('effects.active', 'effects in force', size=keys.ANY, is_text=True)
 LISTS = (ACTIVE.name, 'effects.measured')
 
 
@@ -82,13 +69,14 @@ def effect_uncertainties(values: Mapping[str, Any], effect: str) -> dict[str, fl
 
     A parameter for which the file has none is taken as exact.
     """
-    return {key: float(std) for key, std in below(values, f'{UNCERTAINTIES}.{effect}.').items()}
+    below = keys.below(values, f'{UNCERTAINTIES}.{effect}.')
+    return {key: float(std) for key, std in below.items()}
 
 
 def check_uncertainties(parameters: Mapping[str, Any]) -> None:
     """Raise ModelError for an uncertainty that is none, or of nothing that an effect has."""
     active = parameters.get('effects.active') or ()
-    for of, value in below(parameters, f'{UNCERTAINTIES}.').items():
+    for of, value in keys.below(parameters, f'{UNCERTAINTIES}.').items():
         key, (name, _, rest) = f'{UNCERTAINTIES}.{of}', of.partition('.')
         if find_effect(name) is None or not rest:
             raise UnknownNameError('key', key, [
@@ -96,7 +84,7 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
         if name in active and f'effects.{of}' not in parameters:
             raise ModelError(key, value, f'belong to effects.{of}, which is not there: take the '
                              'line out')
-        Key(key, 'a standard deviation', lower=0).check(value)
+        keys.Key(key, 'a standard deviation', lower=0).check(value)
 
 
 def added_effects(parameters: Mapping[str, Any], robot: Any) -> Iterator[CatalogueEffect]:
@@ -108,8 +96,8 @@ def added_effects(parameters: Mapping[str, Any], robot: Any) -> Iterator[Catalog
         if find_effect(name) is None:
             raise _unknown(name, 'effects.active')
     of_sensors = _effects_of_sensors(parameters)
-    blocks = blocks_below({key: value for key, value in parameters.items() if key not in LISTS},
-                          'effects.')
+    blocks = keys.blocks_below({k: value for k, value in parameters.items() if k not in LISTS},
+                               'effects.')
     for name, values in blocks.items():
         # Of a key that ends with the name, or with a dot behind it.
         if (value := values.pop('', None)) not in (None, {}):
@@ -117,7 +105,7 @@ def added_effects(parameters: Mapping[str, Any], robot: Any) -> Iterator[Catalog
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
-        _check_place(name, values, found, robot, title_of(parameters))
+        _check_place(name, values, found, robot, keys.title_of(parameters))
         # A block that is not active is checked all the same, but may still be incomplete.
         bound = found.bound(robot)
         if name not in active:
@@ -150,22 +138,22 @@ def _effects_of_sensors(parameters: Mapping[str, Any]) -> Any:
     if (key := LISTS[1]) not in parameters:
         return ()
     known = tuple(name for name, effect in catalogue().items() if effect.may_be_measurement)
-    return Key(key, "effects that may be a sensor's", size=ANY, choices=known).check(
+    return keys.Key(key, "effects that may be a sensor's", size=keys.ANY, choices=known).check(
         parameters[key])
 
 
-def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
+def check_tolerances(parameters: Mapping[str, Any], known: Mapping[str, keys.Key]) -> None:
     """Raise ModelError for a tolerance that is none, or of nothing that has one.
 
     Numbers of the model have one, in proportion to them; and what is usually small where a file
     says nothing, such as the error of a zero, in its unit.
     """
-    for target, value in below(parameters, 'tolerances.').items():
+    for target, value in keys.below(parameters, 'tolerances.').items():
         name, parameter = f'tolerances.{target}', find_parameter(target)
-        if not (keys[target].is_number if target in keys else parameter and parameter.expected):
-            raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
-                                                 if keys[key].is_number])
-        Key(name, 'a relative tolerance', lower=0, upper=1).check(value)
+        if not (known[target].is_number if target in known else parameter and parameter.expected):
+            raise UnknownNameError('key', name, [f'tolerances.{key}' for key in known
+                                                 if known[key].is_number])
+        keys.Key(name, 'a relative tolerance', lower=0, upper=1).check(value)
 
 
 @contextmanager
@@ -181,38 +169,38 @@ def source_of_errors(source: str) -> Iterator[None]:
 def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of all keys, complete with defaults, and the added blocks as given."""
     values: dict[str, Any] = {}
-    keys = keys_of(parameters)
-    _require_known(parameters, keys)
-    for name, key in keys.items():
+    known = keys.keys_of(parameters)
+    _require_known(parameters, known)
+    for name, key in known.items():
         if name in parameters:
             values[name] = key.check(parameters[name])
         elif key.default is None:
             raise ModelError(name, MISSING, key.rule)
         else:
             values[name] = key.default
-    check_tolerances(parameters, keys)
+    check_tolerances(parameters, known)
     check_uncertainties(parameters)
     check_reference(parameters)
     return {**values, **{name: value for name, value in parameters.items()
-                         if name.startswith(ADDED)}}
+                         if name.startswith(keys.ADDED)}}
 
 
-def _require_known(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
-    in_blocks = (*keys, *ADDED, *(NAMED if is_described(parameters) else ()))
+def _require_known(parameters: Mapping[str, Any], known: Mapping[str, keys.Key]) -> None:
+    in_blocks = (*known, *keys.ADDED, *(keys.NAMED if keys.is_described(parameters) else ()))
     for name, value in parameters.items():
-        if name in keys or _is_for_others(name):
+        if name in known or _is_for_others(name):
             continue
         if not any(key.startswith(f'{name}.') for key in in_blocks):
-            raise UnknownNameError('key', name, (*keys, *NODE_KEYS))
+            raise UnknownNameError('key', name, (*known, *keys.NODE_KEYS))
         if value not in (None, {}):  # an empty block says nothing
             raise ModelError(name, value, 'be a mapping, of names to their content')
 
 
 def is_known(name: str) -> bool:
     """Return whether a model file may hold a key of that name."""
-    return name in NAMES or _is_for_others(name)
+    return name in keys.NAMES or _is_for_others(name)
 
 
 def _is_for_others(name: str) -> bool:
     """Return whether a key is a node's, or of a block whose keys are not listed one by one."""
-    return name in NODE_KEYS or name.startswith((*NODE_PREFIXES, *ADDED))
+    return name in keys.NODE_KEYS or name.startswith((*keys.NODE_PREFIXES, *keys.ADDED))

@@ -34,17 +34,8 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.state import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
+from pprs_dynamics.physics.model import keys
 from pprs_dynamics.physics.model.forces import DriveLimits
-from pprs_dynamics.physics.model.keys import (
-    DRIVES_KEY,
-    FILES,
-    JOINTS,
-    LOCKED,
-    MOTORS,
-    POSE,
-    below,
-    blocks_below,
-)
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs import robot as three_pprs
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses
@@ -76,7 +67,7 @@ def read_platform(values: Mapping[str, Any],
                else PrintedFriction(blocks) if is_printed else ModelJointFriction(blocks))
     lower, upper = zip(*(values[key] for key in STROKES), strict=True)
     robot = three_pprs.ThreePprs.of(
-        Geometry(**below(values, 'geometry.')), Masses(**below(values, 'masses.')),
+        Geometry(**keys.below(values, 'geometry.')), Masses(**keys.below(values, 'masses.')),
         gravity_in_efforts(values, 'gravity'), (lower, upper, values['limits.effort']),
         radii={name: block['radius'] for name, block in blocks.items()},
         bounds=three_pprs.SingularityBounds(
@@ -129,7 +120,7 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
     UnreadableFileError
         Where its description cannot be read.
     """
-    given = [key for key in FILES if values.get(key)]
+    given = [key for key in keys.FILES if values.get(key)]
     if not given:
         raise ModelError('robot.urdf', MISSING, 'be given, or robot.mjcf instead')
     if len(given) > 1:
@@ -142,23 +133,23 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         description = read_urdf(values[given[0]])
         _require_motors(description, values)
     own = tuple((key, value) for key, value in values.items()
-                if key.startswith(('robot.home.', 'robot.loops.', LOCKED)))
+                if key.startswith(('robot.home.', 'robot.loops.', keys.LOCKED)))
     return _structure(description, values['robot.base'], values['robot.tool'],
-                      values[DRIVES_KEY], own)
+                      values[keys.DRIVES_KEY], own)
 
 
 @lru_cache(maxsize=64)
 def _structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
                own: tuple[tuple[str, Any], ...]) -> Structure:
-    home, poses = below(dict(own), 'robot.home.'), {}
-    for name in [name for name in home if name.endswith(POSE)]:
-        pose, link = home.pop(name), name.removesuffix(POSE)
+    home, poses = keys.below(dict(own), 'robot.home.'), {}
+    for name in [name for name in home if name.endswith(keys.POSE)]:
+        pose, link = home.pop(name), name.removesuffix(keys.POSE)
         if not np.linalg.norm(pose[3:]) > 0:
             raise ModelError(f'robot.home.{name}', list(pose), 'have a quaternion that is not zero')
         if link not in description.links:
             raise UnknownNameError('link', link, description.links, 'robot.home')
         poses[link] = pose_frame(pose)
-    loops = blocks_below(dict(own), 'robot.loops.')
+    loops = keys.blocks_below(dict(own), 'robot.loops.')
     for loop in description.loops:
         if loop.name in loops:
             raise ModelError(f'robot.loops.{loop.name}', loop.kind, 'not stand in the file as '
@@ -167,19 +158,19 @@ def _structure(description: Description, base: str, tool: str, drives: tuple[str
         name, loop['type'], loop['a.link'], Frame.of(loop['a.xyz'], loop['a.rpy']),
         loop['b.link'], Frame.of(loop['b.xyz'], loop['b.rpy'])) for name, loop in loops.items()))
     return build_structure(description, base, tool, drives, closures, home, poses,
-                           below(dict(own), LOCKED))
+                           keys.below(dict(own), keys.LOCKED))
 
 
 def _require_motors(description: Description, values: Mapping[str, Any]) -> None:
     """Raise ModelError where joints share a transmission, and the file does not say how."""
-    drives = set(values[DRIVES_KEY])
-    mapped = {joint for turns in blocks_below(values, MOTORS).values() for joint in turns}
+    drives = set(values[keys.DRIVES_KEY])
+    mapped = {joint for turns in keys.blocks_below(values, keys.MOTORS).values() for joint in turns}
     for gear in coupled(description):
         shared = [name for name in gear.joints if name in drives]
         if set(shared) - mapped:
             turns = ', '.join(f'{name}: 1.0' for name in shared)
             raise ModelError(
-                DRIVES_KEY, list(gear.joints), 'have a motor each, but share a transmission '
+                keys.DRIVES_KEY, list(gear.joints), 'have a motor each, but share a transmission '
                 f'{gear.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
                 '}}, turns of each motor per turn of its joints')
 
@@ -221,7 +212,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
         if joint.armature:
             raise ModelError('robot.mjcf', name, f'have no armature ({joint.armature:g}), as a '
                              'joint without a motor: set its armature to 0')
-        given = f'{JOINTS}{name}.'
+        given = f'{keys.JOINTS}{name}.'
         if (joint.damping or joint.dry) and not any(key.startswith(given) for key in values):
             found |= {f'{given}viscous': joint.damping, f'{given}torque': joint.dry,
                       f'{given}coulomb': 0.0, f'{given}radius': 0.0}
@@ -244,14 +235,14 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
     ModelError
         For a joint that is no drive, and a motor that moves fewer than two.
     """
-    rows = blocks_below(values, MOTORS)
+    rows = keys.blocks_below(values, keys.MOTORS)
     for motor, ratios in rows.items():
         for joint in ratios:
             if joint not in structure.drives:
-                raise UnknownNameError('drive', joint, structure.drives, f'{MOTORS}{motor}')
+                raise UnknownNameError('drive', joint, structure.drives, f'{keys.MOTORS}{motor}')
         if sum(value != 0 for value in ratios.values()) < 2:
-            raise ModelError(f'{MOTORS}{motor}', ratios, 'move two joints or more: one that moves '
-                             'one has its friction in friction.viscous and friction.coulomb')
+            raise ModelError(f'{keys.MOTORS}{motor}', ratios, 'move two joints or more: one that '
+                             'moves one has its friction in friction.viscous and friction.coulomb')
     return {motor: tuple(ratios.get(drive, 0.0) for drive in structure.drives)
             for motor, ratios in rows.items()}
 
@@ -259,7 +250,7 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
 def passive_friction(structure: Structure, values: Mapping[str, Any],
                      ) -> Iterator[ModelJointFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
-    blocks, rows = blocks_below(values, JOINTS), structure.friction_rows
+    blocks, rows = keys.blocks_below(values, keys.JOINTS), structure.friction_rows
     for name in blocks:
         if name not in rows:
             raise UnknownNameError('joint', name, rows, 'friction.joints')
@@ -300,7 +291,7 @@ def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
                       gravity_in_efforts(values, 'robot.gravity'),
                       {name: block['radius'] for name, block in
-                       blocks_below(values, JOINTS).items() if block['radius']},
+                       keys.blocks_below(values, keys.JOINTS).items() if block['radius']},
                       motor_map(structure, values))
     _require_driven_bodies(robot)
     return robot
@@ -316,5 +307,5 @@ def _require_driven_bodies(robot: Mechanism) -> None:
     felt = np.diag(efforts[:-1] - efforts[-1]) + robot.armature
     for name, inertia in zip(structure.drives, felt, strict=True):
         if not inertia > 0:
-            raise ModelError(DRIVES_KEY, name,
+            raise ModelError(keys.DRIVES_KEY, name,
                              'move a body: no link that it moves has a mass')

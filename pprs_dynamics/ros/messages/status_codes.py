@@ -7,14 +7,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from pprs_dynamics.errors import (
-    EffectError,
-    LimitError,
-    MotionError,
-    PprsError,
-    SingularityError,
-    WorkspaceError,
-)
+from pprs_dynamics import errors
 
 Level = Literal['OK', 'WARN', 'ERROR', 'STALE']  # in the order of diagnostic_msgs
 # Why a message is rejected.
@@ -38,12 +31,12 @@ CODES: tuple[str, ...] = (*REJECTIONS, *get_args(Condition))
 
 _KINDS: dict[str, RejectionCode] = {
     'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
-_CODES: dict[type[PprsError], RejectionCode] = {
-    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE',
-    LimitError: 'LIMIT', EffectError: 'EFFECT'}
+_CODES: dict[type[errors.PprsError], RejectionCode] = {
+    errors.SingularityError: 'SINGULAR', errors.WorkspaceError: 'WORKSPACE',
+    errors.LimitError: 'LIMIT', errors.EffectError: 'EFFECT'}
 
 
-class Rejection(PprsError):
+class Rejection(errors.PprsError):
     """A message that breaks a rule.
 
     Parameters
@@ -58,11 +51,11 @@ class Rejection(PprsError):
         super().__init__(f'{code}: {text}')
 
     @classmethod
-    def of(cls, error: PprsError) -> Rejection:
+    def of(cls, error: errors.PprsError) -> Rejection:
         """Return the rejection that an error of the model amounts to."""
         if isinstance(error, Rejection):
             return error
-        if isinstance(error, MotionError):
+        if isinstance(error, errors.MotionError):
             return cls(_KINDS[error.kind], str(error))
         for kind, code in _CODES.items():
             if isinstance(error, kind):

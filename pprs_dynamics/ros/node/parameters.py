@@ -21,16 +21,8 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import find_parameter
+from pprs_dynamics.physics.model import keys
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import (
-    ANY,
-    DRIVES_KEY,
-    FILES,
-    Key,
-    as_list,
-    is_described,
-    keys_of,
-)
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.node.provenance import folder_of
@@ -42,7 +34,7 @@ HISTORY = 'history.'
 
 
 @dataclass(frozen=True)
-class NodeParameter(Key):
+class NodeParameter(keys.Key):
     """A key that only a node has; a switch or a whole number where its default is one.
 
     Listed in `pprs_dynamics.physics.model.keys.NODE_KEYS` too, so that model files may hold it.
@@ -103,8 +95,8 @@ def node_parameter(
     """
     is_list = isinstance(default, tuple)
     if is_list and size is None:
-        size = ANY
-    is_text = (isinstance(default, str) and not choices) or size == ANY
+        size = keys.ANY
+    is_text = (isinstance(default, str) and not choices) or size == keys.ANY
     return NodeParameter(
         name, description, size=size, choices=choices,
         is_text=is_text, may_be_empty=is_text or is_list, default=default, **more)
@@ -135,13 +127,13 @@ def declare_node_parameters(node: Node, parameters: Sequence[NodeParameter]) -> 
 def drive_count(node: Node) -> int:
     """Return how many drives the model has that a node was given."""
     given = overrides(node)
-    joints = given.get(DRIVES_KEY)
+    joints = given.get(keys.DRIVES_KEY)
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
 def has_model(given: Mapping[str, Any]) -> bool:
     """Return whether a robot is among the parameters given, and not only changes of the paper's."""
-    return is_described(given) or any(name.startswith('geometry.') for name in given)
+    return keys.is_described(given) or any(name.startswith('geometry.') for name in given)
 
 
 def declare_model(node: Node, arguments: Sequence[str]) -> None:
@@ -155,12 +147,12 @@ def declare_model(node: Node, arguments: Sequence[str]) -> None:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
-    for key in FILES:
+    for key in keys.FILES:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(located(given[key], folder_of(given[key], arguments)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
-    for name, entry in keys_of(given).items():
+    for name, entry in keys.keys_of(given).items():
         value = given.get(name, defaults.get(name, entry.default))
         if value is None and name not in given:
             raise ModelError(name, MISSING, entry.rule)
@@ -185,14 +177,14 @@ def declared_model(node: Node, arguments: Sequence[str], own: Container[str]) ->
                                        if name not in own})
 
 
-def _declare(node: Node, key: Key, value: Any) -> None:
+def _declare(node: Node, key: keys.Key, value: Any) -> None:
     """Declare a key with a checked value.
 
     Its type and range are checked by the rules of model files, which explain a refusal. rclpy's own
     check would refuse a whole number, and an empty list, which has no type.
     """
     unit = f' [{key.unit}]' if key.unit else ''
-    node.declare_parameter(key.name, as_list(value), ParameterDescriptor(
+    node.declare_parameter(key.name, keys.as_list(value), ParameterDescriptor(
         description=f'{key.description}{unit}', additional_constraints=f'must {key.rule}',
         # An override would bring back a whole number, or a relative path.
         dynamic_typing=True), ignore_override=True)

@@ -20,12 +20,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
-from pprs_dynamics.physics.mechanism.description import (
-    FLOATING,
-    Frame,
-    Joint,
-    principal_inertia,
-)
+from pprs_dynamics.physics.mechanism import description
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_equations import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -190,10 +185,10 @@ class Body:
 
     row: int
     name: str
-    joint: Joint
+    joint: description.Joint
     kind: str
     parent: int
-    frame: Frame
+    frame: description.Frame
     axis: Array
     mass: float
     centre: Array
@@ -236,7 +231,7 @@ class ExportedRobot:
         return {name: value for (of, name), value in self.numbers.items() if of == joint}
 
     @property
-    def frames(self) -> Iterator[tuple[str, int, Frame]]:
+    def frames(self) -> Iterator[tuple[str, int, description.Frame]]:
         """Links without a joint of their own: name, row and frame there."""
         structure = self.mechanism.structure
         own = {body.name for body in self.bodies} | {structure.moved_by[0]}
@@ -248,10 +243,10 @@ class ExportedRobot:
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
     structure, t = mechanism.structure, mechanism.structure.tables
     _, _, home = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
-    found: dict[int, tuple[Joint, str, int]] = {}
+    found: dict[int, tuple[description.Joint, str, int]] = {}
     for joint in structure.description.joints.values():
         row = structure.links[joint.child][0]
-        if joint.kind == FLOATING and structure.moved_by[row] == joint.child:
+        if joint.kind == description.FLOATING and structure.moved_by[row] == joint.child:
             parent = structure.links[joint.parent][0]
             if parent:
                 raise ModelError('robot.urdf', joint.name, 'hang on the base: a free body on a '
@@ -267,8 +262,8 @@ def _bodies(mechanism: Mechanism) -> Iterator[Body]:
 
     for row in sorted(found, key=way):
         joint, kind, parent = found[row]
-        frame = (Frame(home.R[0, row], home.p[0, row]) if kind == FREE
-                 else Frame(t.place_R[row], t.place_p[row]))
+        frame = (description.Frame(home.R[0, row], home.p[0, row]) if kind == FREE
+                 else description.Frame(t.place_R[row], t.place_p[row]))
         name = structure.moved_by[row]
         yield Body(row, name, joint, kind, parent, frame, t.axis[row],
                    *_inertia(name, mechanism.by_joint[row]),
@@ -279,7 +274,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     """Return mass, centre, principal moments and their axes."""
     if not parameters.any():
         return LEAST, np.zeros(3), np.full(3, LEAST), np.eye(3)
-    mass, centre, moments, axes = principal_inertia(parameters)
+    mass, centre, moments, axes = description.principal_inertia(parameters)
     slack = SOUND * max(float(np.abs(parameters[4:]).max()), LEAST)
     if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
         raise ModelError(f'inertia of {name}', tuple(float(value) for value in moments),

@@ -28,16 +28,7 @@ from starlette.routing import Route
 
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
-from pprs_dynamics.app.workbench.masks import (
-    drawn_samples,
-    quantities,
-    quantity,
-    region_mask,
-    robot_motion,
-    shares_in,
-    span_mask,
-    spans_of,
-)
+from pprs_dynamics.app.workbench import masks
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.session import Session
@@ -256,7 +247,7 @@ class Api:
             whole = np.floor(data.time)
             return binary(
                 {'fitted_since': ticks.fitted_since, 'drives': list(ticks.fits.drives),
-                 'quantities': quantities(data)},
+                 'quantities': masks.quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
                  'before': ticks.fits.before.T})
 
@@ -273,16 +264,18 @@ class Api:
         """Answer the shares that unticked effects explain of a selection, and its times."""
         ticks = self.hub.the_session.ticks
         if 'x' in body:
-            mask = region_mask(ticks, body.text('x'), body.text('y'), body.range('x_range'),
-                               body.range('y_range'), body.text('drive'))
+            mask = masks.region_mask(ticks, body.text('x'), body.text('y'), body.range('x_range'),
+                                     body.range('y_range'), body.text('drive'))
         else:
             drive = body.get('drive')
-            mask = span_mask(ticks, *body.range('time'), None if drive is None else [str(drive)])
+            mask = masks.span_mask(
+                ticks, *body.range('time'), None if drive is None else [str(drive)])
         fits, view = ticks.fits, ticks.view
-        return JSONResponse({'shares': [asdict(share) for share in shares_in(mask, fits, view)],
+        shares = masks.shares_in(mask, fits, view)
+        return JSONResponse({'shares': [asdict(share) for share in shares],
                              'before': for_json(root_mean_square(fits.before[mask])),
                              'now': for_json(root_mean_square(view.residual[mask])),
-                             'spans': spans_of(fits.design.residuals, mask),
+                             'spans': masks.spans_of(fits.design.residuals, mask),
                              'samples': int(mask.sum()), 'revision': ticks.revision})
 
     def experiment_file(self, query: Any) -> Response:
@@ -312,14 +305,14 @@ class Api:
         if query.get('drive') not in drives:
             raise BadRequestError(f'drive must be one of {", ".join(drives)}')
         with ticks.steady():
-            x, y = (quantity(ticks.fits, ticks.view, query.get(axis, ''),
-                             drives.index(query['drive'])) for axis in ('x', 'y'))
-        at = drawn_samples(x, y)
+            x, y = (masks.quantity(ticks.fits, ticks.view, query.get(axis, ''),
+                                   drives.index(query['drive'])) for axis in ('x', 'y'))
+        at = masks.drawn_samples(x, y)
         return binary({}, {'x': x[at], 'y': y[at]})
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
-        drawn, arrays = robot_motion(self.hub.the_session.ticks)
+        drawn, arrays = masks.robot_motion(self.hub.the_session.ticks)
         return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
                        'joints': list(drawn.joints.values()), 'labels': drawn.labels}, arrays)
 
