@@ -282,6 +282,20 @@ class MechanismEngine:
         return np.cross(carried.forces[:, bodies],
                         carried.axes[:, [self.state.numbers[name] for name in names]])
 
+    def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
+        """Return efforts against friction of joints along a motion, (N, D); see `friction`.
+
+        With more than one round the loads are those with friction of passive joints.
+        """
+        closed = self.closed(motion)
+        effort: Array | None = None
+        for _ in range(rounds):
+            rubbing = self.friction(joints, closed, self.carried(closed, effort))
+            effort = rubbing.efforts(closed.velocity)
+            if rounds > 1:
+                effort[:, self.state.drives] = 0.0  # a guide's friction loads no other joint
+        return rubbing.of_drives(closed)
+
     def _pushed(self, wrench: Array) -> Array:
         """Let the tool apply a wrench (6,) in the base, and return the joints' efforts, (nv,)."""
         data, efforts, site = self.data, np.zeros(self.model.nv), self.state.sites[TOOL]
@@ -338,11 +352,15 @@ class Rubbing(NamedTuple):
         found: Array = self.joints.viscous + self.dry * np.tanh(x) / (x * width)
         return found
 
+    def efforts(self, velocity: Array) -> Array:
+        """Return the efforts of the tree's joints against it, (N, nv)."""
+        rates = np.einsum('nkiv,nv->nki', self.rows, velocity)
+        return np.einsum('nk,nki,nkiv->nv', self.coefficients(rates), rates, self.rows,
+                         optimize=True)
+
     def of_drives(self, closed: EngineMotion) -> Array:
         """Return the efforts of the drives against it, (N, D)."""
-        rates = np.einsum('nkiv,nv->nki', self.rows, closed.velocity)
-        return np.einsum('nk,nki,nkiv,nvd->nd', self.coefficients(rates), rates, self.rows,
-                         closed.rates, optimize=True)
+        return np.einsum('nvd,nv->nd', closed.rates, self.efforts(closed.velocity))
 
 
 def load_engine(purpose: str = 'the simulated robot') -> Any:

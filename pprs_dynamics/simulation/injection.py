@@ -155,6 +155,8 @@ class PlainRobot:
     model : DriveModel
     motion : JointMotion
         Of the drives.
+    rounds : int
+        1: friction follows loads without friction, as in the model; more: with friction.
 
     Attributes
     ----------
@@ -166,12 +168,12 @@ class PlainRobot:
         Efforts of friction, offset and armature; all efforts of the drives.
     """
 
-    def __init__(self, model: DriveModel, motion: JointMotion) -> None:
-        self.model, self.motion = model, motion
+    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1) -> None:
+        self.model, self.motion, self.rounds = model, motion, rounds
         self.engine = MechanismEngine(model)
         self.closed = self.engine.closed(motion)
         self.carried = self.engine.carried(self.closed)
-        self.friction = own_friction(model, self.engine, motion)
+        self.friction = own_friction(model, self.engine, motion, rounds)
         self.effort = self.carried.efforts + self.friction
 
 
@@ -320,7 +322,7 @@ class Injection(Injecting):
                 motion, velocity=motion.velocity + wound,
                 acceleration=motion.acceleration + np.gradient(wound, self.time, axis=0))
         if self.truths:
-            friction = own_friction(self.model, self.engine, motion)
+            friction = own_friction(self.model, self.engine, motion, self.plain.rounds)
         self.efforts = self.bodies + friction
         self.largest = np.abs(self.efforts).max(axis=0)
         self.temperature = draw_temperatures(self.climate, self.time, self.motion.velocity)
@@ -848,12 +850,11 @@ def own_joint_friction(model: DriveModel) -> JointFriction:
         strict=True)))
 
 
-def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion) -> Array:
+def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion,
+                 rounds: int = 1) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    closed = engine.closed(motion)
-    rubbing = engine.friction(own_joint_friction(model), closed, engine.carried(closed))
-    friction: Array = (
-        model.robot.armature * motion.acceleration + model.offset + rubbing.of_drives(closed))
+    friction: Array = (model.robot.armature * motion.acceleration + model.offset + (
+        engine.joint_friction(motion, own_joint_friction(model), rounds)))
     return friction
 
 

@@ -167,13 +167,13 @@ def test_an_injected_effect_changes_its_drives_alone_and_repeats(name: str) -> N
     assert np.all(shifted[~acts] == 0)
 
 
-def plain_platform(model: DriveModel = PLATFORM, start: float = 0.0,
+def plain_platform(model: DriveModel = PLATFORM, start: float = 0.0, rounds: int = 1,
                    ) -> tuple[PlainRobot, PlatformMotion]:
     """Return a platform along 3 s of a path without hidden effects, and that motion."""
     motion = Excitation(seed=3).motion(start + np.arange(300) / 100)
     state = model.mechanism(motion)
     return PlainRobot(model, JointMotion(
-        state.position, state.velocity, state.acceleration, motion.time)), motion
+        state.position, state.velocity, state.acceleration, motion.time), rounds=rounds), motion
 
 
 @cache
@@ -189,9 +189,9 @@ def test_an_effect_contains_the_friction_that_its_own_load_causes(name: str, fil
     model = DriveModel.load(f'config/{file}.yaml')
     if not model.robot.plans_poses:
         motion: Any = draw_motion(model, 6.0, 3)
-        plain = PlainRobot(model, motion)
+        plain = PlainRobot(model, motion, rounds=4)
     else:
-        plain, motion = plain_platform(model, 6.0)
+        plain, motion = plain_platform(model, 6.0, rounds=4)
     run = Injection(plain, [named(name, np.random.default_rng(1), 1.0)], np.random.default_rng(2))
     added = run.efforts - plain.effort
     kind, _, drive = name.partition(':')
