@@ -12,7 +12,7 @@ import pytest
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.readings.check import find_mistakes
-from pprs_dynamics.inference.readings.evidence import Evidence
+from pprs_dynamics.inference.readings.evidence import forces_of
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.inference.residuals.excerpt import excerpt_of
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -38,9 +38,7 @@ def told(position: Any = POSITION, effort: Any = EFFORT) -> list[OtherReading]:
 
 def test_efforts_without_a_sign_are_told() -> None:
     finding, = told(effort=np.abs(EFFORT))
-    # Lifts bear the weight and never change their sign: theirs may be either.
     assert finding.kind == 'effort_absolute'
-    assert finding.drives == ('slide_1', 'slide_2', 'slide_3')
     assert 'absolute value' in finding.text
 
 
@@ -56,9 +54,8 @@ def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     position[:held] = position[held]
     excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort), 3)
     assert excerpt is not None
-    evidence = Evidence.of(MODEL, excerpt)
-    assert evidence is not None
-    effort[:held] = evidence.force[excerpt.time < TIME[held // 2]][-1]
+    force = forces_of(MODEL, excerpt.motion, excerpt.time).sum(axis=0)
+    effort[:held] = force[excerpt.time < TIME[held // 2]][-1]
     effort[:held, 1] = 20.0
     assert told(position, effort) == []
 

@@ -224,17 +224,15 @@ def test_the_line_that_is_told_mends_a_recording_of_an_arm(mistake: str, tmp_pat
     assert left == ()
 
 
-def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
+def test_efforts_in_percent_are_told(tmp_path: Path) -> None:
     largest = np.array([400.0, 80.0, 30.0])
     text = arm.urdf()
     for limit in largest:
         text = text.replace('effort="200"', f'effort="{limit:g}"', 1)
     model = DriveModel.load(arm.write_arm(tmp_path, text))
-    (finding,) = find_mistakes(model, arm_recording(model, effort=(100 / largest).tolist()))
-    assert "percent of the drives' largest" in finding.what
-    assert columns_line(finding.scales) == (
-        'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, '
-        'reach: {effort_scale: 0.3}}')
+    (finding,) = find_mistakes(model, arm_recording(model, effort=(100 / largest).tolist()), True)
+    assert 'percent of a torque' in finding.what
+    assert [value for _, _, value in finding.scales] == pytest.approx(largest / 100, rel=0.2)
 
 
 OTHERS = {  # folder, model, recording, a clause of what is told, and signs of the efforts

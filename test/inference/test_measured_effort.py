@@ -26,20 +26,14 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.inference.readings.findings import (
-    OtherReading,
-    effort_contents,
-    effort_looks_like,
-    find_no_measurements,
-    looks_like,
-)
+from pprs_dynamics.inference.readings.check import find_mistakes, looks_like
+from pprs_dynamics.inference.readings.findings import OtherReading, effort_looks_like
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 RATE = 200.0  # [Hz]
 DURATION = 20.0  # [s]
-# The first joint of the arm is upright, and carries none.
-WITHOUT_GRAVITY = {'swing': 'without_gravity', 'reach': 'without_gravity'}
+WITHOUT_GRAVITY = dict.fromkeys(('turn', 'swing', 'reach'), 'without_gravity')
 
 
 @dataclass
@@ -131,9 +125,8 @@ def test_a_gain_and_a_sign_are_no_command(run: Run, gain: float) -> None:
 def test_a_law_of_gravity_is_a_command(run: Run) -> None:
     size = np.abs(run.total).max(axis=0)
     effort = 1.1 * run.gravity + 1e-3 * size * np.random.default_rng(3).normal(size=run.total.shape)
-    found = run.kinds(effort, 0.0)
-    assert found is not None
-    assert set(found.values()) == {'command'}
+    found = find_mistakes(run.model, run.of(effort, 0.0))
+    assert 'it looks like what a controller commands' in found[0].what
 
 
 def test_what_drives_lag_behind_is_an_error_of_position(run: Run) -> None:
@@ -169,7 +162,7 @@ def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
     recording = Recording.from_arrays(
         'slow', slow.time, slow.position, slow.velocity,
         forces + np.random.default_rng(0).normal(0, 0.5, forces.shape), model.drives)
-    assert find_no_measurements(model, effort_contents(model, recording), True) == ()
+    assert find_mistakes(model, recording) == ()
 
 
 def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
@@ -241,5 +234,5 @@ CASES_OF = {
 def test_other_peoples_recordings(case: str) -> None:
     for recording, model, kinds in CASES_OF[case]:
         read = shared_case(case, model, recording)
-        found = find_no_measurements(read[0], effort_contents(*read), True)
+        found = find_mistakes(*read)
         assert {finding.kind for finding in found} == kinds, recording

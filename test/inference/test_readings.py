@@ -127,8 +127,8 @@ def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
 
 
 @pytest.mark.parametrize(('factor', 'words'), [
-    (-10.197, 'in kgf cm'), (11.0, 'in kgf cm, or'), (8.0, 'it looks like currents in amperes'),
-    (110.0, 'N cm (then write effort_scale: 0.01)'), (1e-3, 'in kN m')])
+    (-10.197, 'in kgf cm'), (11.0, 'in kgf cm'), (8.0, 'it looks like currents in amperes'),
+    (110.0, 'gain: [0.00909, '), (1e-3, 'in kN m')])
 def test_a_common_factor_is_a_unit_only_near_its_constant(
     arm: DriveModel, factor: float, words: str,
 ) -> None:

@@ -12,8 +12,8 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.check import other_mounting
-from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, looks_like
+from pprs_dynamics.inference.readings.check import looks_like
+from pprs_dynamics.inference.readings.findings import Mistake, OtherReading
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
@@ -79,16 +79,15 @@ def _other_reading(recordings: Sequence[Recording]) -> str:
         if isinstance(finding, OtherReading)))
 
 
-@outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '
+@outside_cost('another reading, efforts that are no measurement, and stick-slip end the '
               'diagnosis before the search: `unknown`')
 def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
           reference: Reference | None) -> tuple[dict[str, Mistake], dict[str, StickSlip]]:
-    """Return the drives whose efforts are no measurement, and those that stick and slip."""
-    other = other_mounting(model, recordings) or looks_like(model, recordings)
+    """Return the drives whose recording has another reading, and those that stick and slip."""
+    other = looks_like(model, recordings)
     if other and reference is not None:
         # What the reference looks like as well is no change.
-        before = (other_mounting(model, reference.recordings)
-                  or looks_like(model, reference.recordings))
+        before = looks_like(model, reference.recordings)
         other = {drive: looks for drive, looks in other.items()
                  if drive not in before or before[drive].kind != looks.kind}
     # No law of a drive's motion describes what its controller and its elasticity do.

@@ -98,11 +98,13 @@ def _has_no_friction(model: DriveModel) -> bool:
 
 
 def measure_first(findings: Sequence[Mistake], files: GivenFiles) -> tuple[str, str]:
-    """Return the next step where efforts are no measurement, and the command that ignores this."""
-    lines = list(dict.fromkeys(finding.line for finding in findings if finding.line))
-    if all(finding.kind == 'mounting' for finding in findings):
-        return (f'Write {listed(lines)} into the model file. If the robot is mounted as in the '
-                'model, continue with', files.command('diagnose', '--as-it-is'))
+    """Return the next step where a recording has another reading, and the command to ignore it."""
+    from pprs_dynamics.inference.readings.findings import OtherReading, lines_of
+
+    lines = lines_of(dict.fromkeys(findings))
+    if any(isinstance(finding, OtherReading) for finding in findings):
+        return (f'Write {listed(lines)} into the model file. If all is as the model file says, '
+                'continue with', files.command('diagnose', '--as-it-is'))
     say = f', or write {listed(lines, "or")} into the model file' if lines else ''
     return (f'Record the measured effort{say}. If it is measured, continue with',
             files.command('diagnose', '--as-it-is'))

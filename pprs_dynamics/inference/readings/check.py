@@ -9,7 +9,7 @@ is reported with the line that says so. Nothing is ever changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -21,7 +21,6 @@ from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
     Likelihood,
-    effort_contents,
     in_reading,
     mounting_in,
     read_motion,
@@ -35,7 +34,6 @@ from pprs_dynamics.inference.readings.findings import (
     find_other_velocities,
     find_shares,
     find_sign_bit,
-    find_unsigned,
     findings_of,
     knows_forces,
     lines_of,
@@ -118,15 +116,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     likely = search.likely()
     if not search.explains and (found := tuple(find_motion(model, excerpt))):
         return found
-    evidence = search.evidence(search.rows[0])
-    others = () if evidence is None else find_no_measurements(
-        model, effort_contents(model, recording, evidence), search.has_gain)
     by_reading: list[list[Mistake]] = []
-    # A command has no inertia, and in a smaller unit of positions an effort has none either.
-    if likely and likely[0].reading.kinds == {'position_unit'} and any(
-            other.kind == table.COMMAND for other in others) and np.all(
-                search.reach(search.rows[0]) < table.BEYOND):
-        by_reading.append([*others])
     for fit in likely or [Fit(search.rows[0])]:
         said: list[Mistake] = [*findings_of(model, recording, fit.reading)]
         if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
@@ -144,19 +134,16 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
                 ' and '.join(mistake.what for mistake in said) or PLAIN for said in by_reading),
             ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
     mistakes += find_shares(model)
-    if evidence is None or any(isinstance(mistake, OtherReading) for mistake in mistakes):
+    evidence = search.evidence(search.rows[0])
+    if mistakes or evidence is None:
         return tuple(mistakes)
-    mistakes += find_unsigned(model, recording, excerpt, evidence)
-    return tuple(mistakes or others)
+    return tuple(find_no_measurements(model, recording, evidence))
 
 
-def other_mounting(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
-    """Return the finding that gravity has another direction than in the model, by drive."""
-    for recording in recordings:
-        excerpt, plain = excerpt_of(recording, table.STRETCHES), Reading.plain(len(model.drives))
-        if excerpt is not None and (row := mounting_in(model, excerpt, plain)) is not None:
-            return dict.fromkeys(model.drives, findings_of(model, recording, row.after(plain))[0])
-    return {}
+def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
+    """Return what recordings look like instead of what the model file says, by drive."""
+    return {drive: finding for recording in recordings
+            for finding in find_mistakes(model, recording) for drive in finding.drives}
 
 
 class Search:
@@ -190,6 +177,7 @@ class Search:
         # Degrees are not in degrees again.
         self.rows = readings(model.drives, model.units, self._loads(), [*self._excerpts][1:],
                              bool(np.all(recording.position[:, turning] % 1 == 0)),
+                             not np.any(recording.effort < 0),
                              [d for d, drive in enumerate(model.drives) if abs(
                                  model.recorded.columns_of(drive).position_scale)
                               in table.POSITION_UNITS])
@@ -227,12 +215,11 @@ class Search:
         return read_motion(self.excerpt(reading).motion, reading)
 
     def evidence(self, reading: Reading) -> Evidence | None:
-        """Return the evidence of a reading; the plain motion may be followed in pieces."""
+        """Return the evidence of a reading; None where its motion is impossible."""
         key = reading.of_motion
         if key not in self._evidence:
             self._evidence[key] = Evidence.of(
-                in_reading(self.model, reading), self.excerpt(reading),
-                None if key == self.rows[0].of_motion else reading)
+                in_reading(self.model, reading), self.excerpt(reading), reading)
         return self._evidence[key]
 
     def _strokes(self) -> tuple[Array, Array]:
@@ -265,7 +252,8 @@ class Search:
             return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
         self.explains = bool(explains and start.largest_residual < table.EXPLAINED)
-        tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST}
+        tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST} - (
+            set() if self.has_gain else {*table.LACKING})
         seed = None
         while self._top() is not seed:
             seed = self._top()
@@ -288,19 +276,20 @@ class Search:
     def likely(self) -> list[Fit]:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
         best = self.best()
-        if best.reading.is_plain or best.residual > table.GOOD_FIT:
-            far = self.reach(self.start.reading) > table.FAR
-            if best.residual <= table.GOOD_FIT and not self._against_velocities(best.reading):
-                # Angles that explain the efforts are in the right unit, whatever limits say.
-                far &= [not units.turns for units in self.model.units]
-            units = [unit for row in self.rows if np.any(far) and row.kind == 'position_unit'
-                     for unit in self._after(row, self.rows[0])]
-            if units:
-                return [Fit(units[0]), self.start]
+        is_good = best.residual <= table.GOOD_FIT or best.reading.is_no_measurement
+        # Angles that explain the efforts are in the right unit, whatever limits say.
+        is_right = is_good and not self._against_velocities(best.reading)
+        far = (self.reach(self.start.reading) > table.FAR) & [
+            not (is_right and units.turns) for units in self.model.units]
+        if np.any(far) and (best.reading.is_plain or not is_good) and (units := [
+                unit for row in self.rows if row.kind == 'position_unit'
+                for unit in self._after(row, self.rows[0])]):
+            return [Fit(units[0]), self.start]
         # The inertia of a drive without weight may be invented, a unit of its efforts not.
         evidence, scales = self.evidence(best.reading), best.reading.effort_scale
-        if best.residual > table.GOOD_FIT or evidence is None or not (
-                self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))):
+        if not is_good or evidence is None or not (
+                self.is_first or evidence.has_weight or np.all(np.isin(scales, table.SCALES))
+                or best.reading.is_no_measurement):
             return []
         rivals = self._rivals(best)
         # Where inertia and weight show no sign, friction alone is not sure of one.
@@ -348,7 +337,7 @@ class Search:
 
     def _may_follow(self, row: Reading, before: Reading) -> bool:
         """Return whether a row may be added to a reading."""
-        if 'drive_order' in {row.kind, *before.kinds}:
+        if {'drive_order', *table.LACKING} & {row.kind, *before.kinds}:
             return not before.kinds
         return all(row.kind != part.kind or (row.kind == 'position_offset' and not (
             {*row.drives} & {*part.drives})) for part in before.parts)
@@ -365,7 +354,13 @@ class Search:
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
         # Symmetric robots fit nearly as well in another order of their drives.
-        return row.kind != 'drive_order' or fit.residual < table.BETTER_ORDER * self.start.residual
+        if row.kind == 'drive_order':
+            return fit.residual < table.BETTER_ORDER * self.start.residual
+        # What nothing explains, with any sign, may be external.
+        evidence = self.evidence(fit.reading)
+        return row.kind not in table.LACKING or fit.residual < table.GOOD_FIT or (
+            evidence is not None and fit.residual < evidence.unexplained * (
+                table.NO_WORSE.get(row.kind, 0.0)))
 
     def _top(self) -> Fit:
         """Return the best reading; of those that fit alike the first, which is the simplest."""
@@ -389,7 +384,9 @@ class Search:
 
         seen, found = {written(best.reading)}, []
         for fit in sorted(self.fits, key=lambda fit: -fit.score):
-            if best.score - fit.score < table.SURE and written(fit.reading) not in seen:
+            if best.score - fit.score < table.SURE and written(fit.reading) not in seen and (
+                    fit.reading.is_plain or fit.residual <= table.GOOD_FIT) and not (
+                        best.reading.is_no_measurement and fit.reading.is_no_measurement):
                 seen.add(written(fit.reading))
                 found.append(fit)
         return found[:1]
@@ -401,10 +398,11 @@ class Search:
             return []
         cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
         if not np.isfinite(excerpt.effort).any():
-            return [Fit(reading, -cost, 0.0, 0.0)]
+            return [Fit(reading, -cost, table.GOOD_FIT)]
         evidence = self.evidence(reading)
-        # A mounting without weight explains none.
-        if evidence is None or (reading.gravity is not None and not evidence.has_weight):
+        # A mounting without weight explains none, and an external torque lacks more than inertia.
+        if evidence is None or ((reading.gravity is not None or reading.contains == table.LACKING[
+                table.EXTERNAL][0]) and not evidence.has_weight):
             return []
         measured = self._measured(reading, excerpt, evidence)
         if not measured:
@@ -412,23 +410,25 @@ class Search:
 
         @cache
         def likelihood(d: int, scale: float) -> Likelihood:
-            return evidence.likelihood(d, reading.efforts[d], scale, self.masses)
+            return evidence.likelihood(d, reading.efforts[d], scale, self.masses,
+                                       reading.contains)
 
-        def fit_of(scales: Array, price: float, share: str = '') -> Fit:
+        def fit_of(scales: Array, price: float) -> Fit:
             found = [likelihood(d, float(scales[d])) for d in measured]
             score, prior, residual = np.array(found).T
             # A guess of one mass is a guess of all.
-            return Fit(replace(reading, effort_scale=scales, share=share),
+            return Fit(replace(reading, effort_scale=scales),
                        float(np.sum(score + prior) - prior.max()) - cost - price,
                        float(np.exp(np.mean(np.log(residual)))), float(residual.max()),
                        float(prior.max()), float(residual.min()), float(np.mean(prior)))
 
-        def alone(d: int, scales: Sequence[float]) -> float:
-            return max((likelihood(d, scale).score - _cost([scale]), scale) for scale in scales)[1]
-
-        first = fit_of(np.ones(len(self.model.drives)), 0.0)
-        fits = [first, *(fit_of(*row) for row in self._effort_rows(
-            reading, evidence, measured, alone))]
+        negated = [d for d in measured if likelihood(d, -1.0).score - likelihood(d, 1.0).score > (
+            table.COST['effort_sign'])]
+        signs = np.where(np.isin(np.arange(len(self.model.drives)), negated), -1.0, 1.0)
+        fits = [fit_of(np.ones(len(self.model.drives)), 0.0)]
+        if 0 in reading.contains:
+            return fits
+        fits += [fit_of(*row) for row in self._effort_rows(reading, evidence, measured, signs)]
         if {'position_offset', 'position_unit', 'mounting', 'load'} & {
                 part.kind for part in reading.parts}:
             # Another weight is credible only for efforts that show weight or inertia.
@@ -436,9 +436,8 @@ class Search:
         return fits
 
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
-                     alone: Callable[[int, Sequence[float]], float],
-                     ) -> Iterator[tuple[Array, float, str]]:
-        """Yield scales of efforts, (D,), their prior cost and the share that they are.
+                     negated: Array) -> Iterator[tuple[Array, float]]:
+        """Yield scales of efforts, (D,), and their prior cost.
 
         Parameters
         ----------
@@ -446,54 +445,36 @@ class Search:
         evidence : Evidence
         measured : sequence of int
             Drives whose efforts count.
-        alone : callable
-            Returns the likeliest of some scales of a drive.
+        negated : (D,) array
+            The likelier sign of each drive's efforts.
         """
+        kinds = [negated[[*family]] for family in table.families(self.model.drives)]
+        yield negated, _cost(negated[measured]) if np.ptp(negated[measured]) == 0 else sum(
+            _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds)
         factors = np.array([evidence.factor(d, e) for d, e in enumerate(reading.efforts.tolist())])
-        units = [scale for scale in table.SCALES if self.has_gain or abs(scale) == 1]
-        if not all(drive.turns for drive in self.model.units):
-            units = [scale for scale in units if abs(scale) != table.KGF_CM]
-
-        def is_near(scale: float, group: Sequence[int], most: float = np.inf) -> bool:
-            off = np.abs(np.log(np.abs(factors[group] / scale)))
-            off = off[np.isfinite(off)]
-            return abs(scale) == 1 or bool(
-                len(off) and off.max() < np.log(min(most, table.OFF_IN_UNIT[abs(scale)])))
-
-        drives, scales, same = np.arange(len(factors)), np.ones(len(factors)), self.same_masses
-        for d in measured:
-            scales[d] = alone(d, [scale for scale in units if scale in table.OF_ONE
-                                  and is_near(scale, [d])])
-        kinds = [scales[[*family]] for family in table.families(self.model.drives)]
-        yield scales, _cost(scales[measured]) if np.ptp(scales[measured]) == 0 else sum(
-            _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds), ''
-        for scale in units:
-            if is_near(scale, measured):
-                recorded = evidence.total[drives, reading.efforts] > 0
-                yield np.where(recorded, scale, 1.0), _cost([scale]), ''
         known = [d for d in measured if np.isfinite(factors[d])]
+        drives, recorded = np.arange(len(factors)), evidence.total[
+            np.arange(len(factors)), reading.efforts] > 0
         signs, sizes = np.sign(factors[known]), np.abs(factors[known])
-        if not (known and self.has_gain) or np.ptp(signs) > 0:
+        off = {unit: np.exp(np.abs(np.log(sizes / unit)).max(initial=0.0))
+               for unit in table.OFF_IN_UNIT if known and self.has_gain and (
+                   unit != table.KGF_CM or all(drive.turns for drive in self.model.units))}
+        for scale in table.SCALES:
+            unit = abs(scale)
+            if unit == 1 or (unit in off and off[unit] < table.OFF_IN_UNIT[unit][1]):
+                yield np.where(recorded, scale, 1.0), _cost([scale])
+        if not off or np.ptp(signs) > 0:
             return
-        price, limits = _cost(signs[:1]), self.model.limits.efforts
-        if evidence.has_weight and len(known) > 1 and np.all(np.isfinite(limits[known])):
-            for share, name in table.SHARES.items():
-                scales = signs[0] / (share * limits)
-                # Factors near 1 are errors of masses.
-                if np.any(np.abs(np.log(np.abs(scales[known]))) > same) and np.all(
-                        np.abs(np.log(factors[known] / scales[known])) < same):
-                    yield scales, price + table.COST['effort_unit'] + 1.0, name
         # A load may multiply what one drive of several needs, and factors of each drive explain
         # it as well; constants that are nearly a unit are that.
-        off = np.abs(np.log(sizes)) > same
-        is_off = not reading.load and np.any(off) if self.is_first else (
-            np.all(off) and len(known) >= min(2, len(factors)))
-        if is_off and np.any(sizes > table.LARGEST_COMPLIANCE) and not any(
-                is_near(scale, known, table.NEARLY_KGF_CM if abs(scale) == table.KGF_CM else np.inf)
-                for scale in units if abs(scale) != 1):
+        others = np.abs(np.log(sizes)) > self.same_masses
+        is_other = not reading.load and np.any(others) if self.is_first else (
+            np.all(others) and len(known) >= min(2, len(factors)))
+        if is_other and not any(off[unit] < table.OFF_IN_UNIT[unit][0] for unit in off):
             # Drives that show no factor of their own are recorded like the others.
             yield (np.where(np.isin(drives, known), factors, np.median(factors[known])),
-                   price + self.cost_of_constants, '')
+                   _cost(signs[:1]) + (table.COST[table.POSITION_ERROR] if np.all(
+                       sizes < table.LARGEST_COMPLIANCE) else self.cost_of_constants))
 
     def _measured(self, reading: Reading, excerpt: Excerpt, evidence: Evidence) -> list[int]:
         """Return the drives that move, if some do, and whose efforts are no zeros among others."""
@@ -510,15 +491,13 @@ class Search:
     def _possible(self, reading: Reading) -> bool:
         """Return whether a reading brings positions into the strokes."""
         lower, upper = self.strokes
-        with np.errstate(invalid='ignore'):
-            slack = table.STROKE_SLACK * (upper - lower)
+        slack = table.STROKE_SLACK * (upper - lower)
         position = self.motion(reading).position
         # Drives may report angles from 0 to a turn.
         turns = np.array([units.turns for units in self.model.units]) & np.isfinite(upper - lower)
         middle = np.mean(np.where(turns, (lower, upper), 0.0), axis=0)
         position = np.where(turns, position - 2 * np.pi * np.round(
             (position - middle) / (2 * np.pi)), position)
-        slack = np.where(np.isfinite(slack), slack, 0.0)
         # What one mistake does not concern may be the next one.
         of_motion = sorted({k for part in reading.parts for k in part.drives}) or slice(None)
         return not np.any(((position < lower - slack) | (position > upper + slack))[:, of_motion])
@@ -529,7 +508,7 @@ class Search:
         return np.asarray(reach / np.maximum(*np.abs(self.strokes)))
 
     def _outside(self, reading: Reading) -> float:
-        """Return the cost of positions and speeds that are beyond their limits."""
+        """Return the cost of positions and speeds beyond their limits, and of tiny motions."""
         motion = self.motion(reading)
         speed = np.abs(motion.velocity).max(axis=0) / np.where(
             np.isfinite(self.strokes[0]), self.model.robot.structure.speed, np.inf)

@@ -450,6 +450,8 @@ def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: fl
     if excerpt is None:
         return Fit(Reading.plain(len(model.drives)), layout.evidence)
     search = Search(model, recording, excerpt, is_first=True, rate=rate)
+    # A thermometer of a robot looks like the weight that a controller commands.
+    search.rows = [row for row in search.rows if row.kind not in table.LACKING]
     fit = search.best()
     evidence = search.evidence(fit.reading)
     # A column that certainly holds inertia or weight is an effort in some unit.

@@ -15,8 +15,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.evidence import (
     Evidence,
-    Shares,
-    effort_contents,
+    fast_noise,
     gravity_key,
 )
 from pprs_dynamics.inference.readings.names import is_share
@@ -29,8 +28,11 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 from pprs_dynamics.system.plain_yaml import as_yaml
 
-KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
-         recorded_names.EXTERNAL: (table.EXTERNAL, 'external torques')}
+KINDS = {recorded_names.COMMANDED: table.COMMAND, recorded_names.EXTERNAL: table.EXTERNAL}
+# What efforts are, as a model file says it, by what they look like.
+LINES = {table.COMMAND: recorded_names.COMMANDED, table.POSITION_ERROR: recorded_names.COMMANDED,
+         table.EXTERNAL: recorded_names.EXTERNAL,
+         table.WITHOUT_GRAVITY: recorded_names.WITHOUT_GRAVITY}
 Scale = tuple[str, str, float | str | int]  # drive, key below `columns`, value
 Scales = tuple[Scale, ...]
 
@@ -120,19 +122,25 @@ def gravity_line(model: DriveModel, gravity: Array) -> str:
 # -------------------------------------------------------------------------- of other readings
 
 
-def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> list[OtherReading]:
+def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> list[Mistake]:
     """Return the mistakes of times, of positions and order, and of efforts."""
     drives, scales, every = model.drives, reading.effort_scale, tuple(range(len(model.drives)))
-    found = []
+    found: list[Mistake] = []
     for part in reading.parts:
         line, changes = '', position_scales(model, part, reading)
         if part.time_unit != 1:
             changes = (_time_scale(model, part.time_unit),)
         if part.kind == 'drive_order':
-            changes, line = _order_scales(model, recording, reading)
+            changes = _order_scales(model, recording, reading)
         if part.gravity is not None:
             line, changes = gravity_line(model, part.gravity), ()
-        if part.what:
+        if part.kind in LINES:
+            columns = model.recorded.columns
+            what = part.what if part.kind != table.COMMAND or not (columns and columns.rate) else (
+                f'{part.what}; or there are fewer samples per second than {columns.rate:g}')
+            found.append(NoMeasurement.of(part.kind, drives, every, what,
+                                          f'{EFFORT_KIND}: {LINES[part.kind]}'))
+        elif part.what:
             found.append(OtherReading.of(part.kind, drives, part.drives, part.what, line,
                                          scales=changes))
 
@@ -142,20 +150,19 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         noun = f'the effort of {named(drives, tuple(group))}'
         found.append(OtherReading.of(kind, drives, group, f'{noun} {what}', scales=changes))
 
-    if reading.share:
-        of('effort_share', every, f"looks like {reading.share} of the drives' largest")
+    if reading.is_no_measurement and np.any(scales != 1):
+        found.append(NoMeasurement.of(
+            table.POSITION_ERROR, drives, every, f'the effort of {named(drives, every)} is '
+            f'{scales[0]:.2g} times what the model says: it looks like an error of position under '
+            'the effort, or is in another unit', f'{EFFORT_KIND}: {LINES[table.POSITION_ERROR]}'))
     elif not np.all(np.isin(scales, table.SCALES)):
         listed = ', '.join(f'{scale:.3g} ({drive})' for drive, scale in zip(
             drives, scales, strict=True) if scale != 1)
         gains = ', '.join(f'{1 / scale:.3g}' for scale in scales)
-        known = [f'{name.format(model.units[0].effort)} (then write effort_scale: {1 / unit:.6g}), '
-                 for unit, name in (table.TORQUES if all(
-                     units.turns for units in model.units) else table.EFFORTS).items()
-                 if np.all(np.abs(np.log(np.abs(scales) / unit)) < np.log(table.NAMED))]
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
            f'amperes (then write effort_kind: current, and under robot  gain: [{gains}]), '
-           f'{"".join(known)}percent of a torque, or another unit')
+           'percent of a torque, or another unit')
     else:
         for scale in dict.fromkeys(scales[scales != 1].tolist()):
             group = np.flatnonzero(scales == scale).tolist()
@@ -172,23 +179,21 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
 def find_other_velocities(model: DriveModel, factors: Mapping[int, tuple[float, float]],
                           time_unit: float) -> Iterator[OtherReading]:
     """Yield recorded velocities that are a multiple of the derivatives of positions."""
-    groups: dict[float, list[int]] = {1.0: []}
+    groups: dict[float, list[int]] = {}
+    drives, known = model.drives, (*table.VELOCITY_UNITS, *(
+        1 / unit for unit in table.VELOCITY_UNITS))
     for drive, (once, doubt) in factors.items():
         factor = once * time_unit
-        doubt_of_one = max(doubt, table.NEAR_ONE)
-        unit = near(factor, (1.0,), doubt_of_one) or near(
-            factor, (*table.VELOCITY_UNITS, *(1 / unit for unit in table.VELOCITY_UNITS), *groups),
-            doubt)
-        groups.setdefault(unit or float(f'{factor:.4g}'), []).append(drive)
-    drives = model.drives
+        if not near(factor, (1.0,), max(doubt, table.NEAR_ONE)):
+            unit = near(factor, (*known, *groups), doubt) or float(f'{factor:.4g}')
+            groups.setdefault(unit, []).append(drive)
     for factor, group in groups.items():
-        if group and factor != 1:
-            times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
-            yield OtherReading.of(
-                'velocity', drives, group, f'the recorded velocity of {named(drives, tuple(group))}'
-                f' is {times} the derivative of the position', scales=tuple(
-                    (drives[k], 'velocity_scale', model.recorded.columns_of(
-                        drives[k]).velocity_scale / factor) for k in group))
+        times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
+        yield OtherReading.of(
+            'velocity', drives, group, f'the recorded velocity of {named(drives, tuple(group))} '
+            f'is {times} the derivative of the position', scales=tuple(
+                (drives[k], 'velocity_scale', model.recorded.columns_of(
+                    drives[k]).velocity_scale / factor) for k in group))
 
 
 def near(factor: float, units: Iterable[float], doubt: float = table.RATE_OFF) -> float:
@@ -251,23 +256,16 @@ def position_scales(model: DriveModel, part: Reading, whole: Reading) -> Scales:
     return tuple(found)
 
 
-def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> tuple[Scales, str]:
-    """Return the columns with which drives are read in another order, or a line of joints."""
-    drives, joints = model.drives, model.recorded.joints
-    moved = [(keys, places) for keys, places in (
+def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> Scales:
+    """Return the columns with which drives are read in another order."""
+    drives = model.drives
+    known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
+    names = {drive: model.recorded.columns_of(drive).names or {
+        key: f'{joint}/{key}' for key in known}
+        for drive, joint in zip(drives, model.recorded.joints, strict=True)}
+    return tuple((drives[k], key, names[drives[order[k]]][key]) for keys, order in (
         (('position', 'velocity'), reading.positions), (('effort', 'current'), reading.efforts))
-        if np.any(places != np.arange(len(drives)))]
-    names = {drive: model.recorded.columns_of(drive).names for drive in drives}
-    if not any(names.values()):
-        if len(moved) > 1:
-            return (), 'joint_map: {' + ', '.join(
-                f'{as_yaml(drives[k])}: {as_yaml(joints[moved[0][1][k]])}'
-                for k in reading.drives) + '}'
-        known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
-        names = {drive: {key: f'{joint}/{key}' for key in known}
-                 for drive, joint in zip(drives, joints, strict=True)}
-    return tuple((drives[k], key, names[drives[order[k]]][key]) for keys, order in moved
-                 for k in reading.drives for key in keys if key in names[drives[order[k]]]), ''
+        for k in reading.drives if order[k] != k for key in keys if key in names[drives[order[k]]])
 
 
 # ------------------------------------------------------------------ efforts and what they are
@@ -298,26 +296,6 @@ def _has_sign(effort: Array, bit: int) -> bool:
     return bool(0.02 < np.mean(above) < 0.98 and steps < table.CALMER * raw)
 
 
-def find_unsigned(model: DriveModel, recording: Recording, excerpt: Excerpt, evidence: Evidence,
-                  ) -> Iterator[OtherReading]:
-    """Yield efforts that are recorded without their sign."""
-    unsigned = []
-    for d in np.flatnonzero(evidence.size > table.WEAK * evidence.size.max()).tolist():
-        known = np.isfinite(excerpt.effort[:, d]) & np.isfinite(evidence.force).all(axis=1)
-        effort, force = excerpt.effort[known, d], evidence.force[known, d]
-        if np.any(recording.effort[:, d] < 0) or not np.any(effort):
-            continue
-        below = float(np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2))
-        if table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and table.CLEARLY * np.sum(
-                (effort - np.abs(force)) ** 2) < np.sum((effort - force) ** 2):
-            unsigned.append(d)
-    if unsigned:
-        yield OtherReading.of(
-            'effort_absolute', model.drives, unsigned,
-            f'the effort of {named(model.drives, tuple(unsigned))} looks like its absolute value: '
-            'it is never below 0, where the model changes sign; it must be recorded with its sign')
-
-
 # ------------------------------------------------------------------------------- measurements
 
 
@@ -340,73 +318,19 @@ def find_shares(model: DriveModel) -> Iterator[OtherReading]:
             f'{{{as_yaml(model.drives[group[0]])}: {{effort_scale: 0.3}}}}')
 
 
-def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares], has_gain: bool,
-                         ) -> tuple[NoMeasurement, ...]:
-    """Return what efforts look like that are no measurement, a finding for each kind.
-
-    Parameters
-    ----------
-    model : DriveModel
-    contents : mapping of str to Shares
-        By drive; of a recording in the units and signs that it says.
-    has_gain : bool
-        Whether its efforts are forces.
-    """
+def find_no_measurements(model: DriveModel, recording: Recording, evidence: Evidence,
+                         ) -> Iterator[NoMeasurement]:
+    """Yield that efforts are no measurement, as the model file or their lack of noise says."""
     if model.effort_kind in KINDS:
-        kind, noun = KINDS[model.effort_kind]
-        return (NoMeasurement.of(kind, model.drives, range(len(model.drives)), f'the efforts are '
-                                 f'{noun}, as the model file says with {EFFORT_KIND}: '
-                                 f'{model.effort_kind}'),)
-    kinds = {drive: content.kind for drive, content in contents.items()}
-    # What one drive shows certainly is true of all: they are recorded in the same way.
-    # Forces of an unknown size cannot be compared with a model's.
-    weighs, moves = not has_gain, not has_gain
-    for content in contents.values():
-        weighs |= abs(content.gravity) > table.LEAST_SHARE > content.gravity_doubt
-        moves |= abs(content.inertia) > table.LEAST_SHARE > content.inertia_doubt
-    excluded = ({table.WITHOUT_GRAVITY, table.EXTERNAL} if weighs else set()) | (
-        {table.COMMAND, table.POSITION_ERROR, table.EXTERNAL} if moves else set())
-    kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
-    return tuple(_finding(model, contents, [drive for drive in kinds if kinds[drive] == kind], kind)
-                 for kind in dict.fromkeys(kinds.values()) if kind)
-
-
-def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
-    """Return the finding for each drive whose effort is no measurement in one of the recordings."""
-    found: dict[str, Mistake] = {}
-    for recording in recordings:
-        for finding in find_no_measurements(
-                model, effort_contents(model, recording), knows_forces(model)):
-            found = {**dict.fromkeys(finding.drives, finding), **found}
-    return {drive: found[drive] for drive in model.drives if drive in found}
-
-
-def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence[str],
-             kind: str) -> NoMeasurement:
-    group = tuple(model.drives.index(drive) for drive in drives)
-    content = contents[drives[0]]
-    of = f'the effort of {named(model.drives, group)}'
-    gravity = f'gravity ({_amount(content.gravity, content.gravity_doubt)})'
-    inertia = f'inertia ({_amount(content.inertia, content.inertia_doubt)})'
-    others = [gravity] * content.lacks_gravity + ['friction'] * (not content.has_friction)
-    lacks = f'{of} contains no {" nor ".join([inertia, *others])}: it looks like'
-    what = {
-        table.WITHOUT_GRAVITY: f'{of} contains no {gravity}: it looks as if gravity was already '
-        'subtracted; or a counterweight bears it, or the base is mounted in another direction',
-        table.EXTERNAL: f'{of} contains no {inertia} nor {gravity}: it looks like an external '
-        'torque, from which a model was already subtracted',
-        table.NOISE_FREE: f'{of} contains no noise: it looks computed, not measured',
-        table.POSITION_ERROR: f'{of} is {content.compliance:.2g} times what the model says: it '
-        'looks like an error of position under the effort, or is in another unit'
-        if content.compliance else f'{lacks} an error of position, which grows with the velocity, '
-        'not like a measurement',
-        table.COMMAND: f'{lacks} what a controller commands, not like a measurement'}[kind]
-    line = {table.COMMAND: recorded_names.COMMANDED, table.EXTERNAL: kind,
-            table.POSITION_ERROR: recorded_names.COMMANDED, table.WITHOUT_GRAVITY: kind}.get(kind)
-    return NoMeasurement.of(kind, model.drives, group, what,
-                            f'{EFFORT_KIND}: {line}' if line else '')
-
-
-def _amount(share: float, doubt: float) -> str:
-    # Adding 0 makes minus nothing nothing.
-    return f'{round(share, 2) + 0.0:.2f} ± {doubt:.2f} of what the model has'
+        yield NoMeasurement.of(
+            KINDS[model.effort_kind], model.drives, range(len(model.drives)),
+            f'the efforts are {model.effort_kind}, as the model file says with {EFFORT_KIND}')
+        return
+    group = [d for d in range(len(model.drives)) if evidence.moves(model)[d]
+             and evidence.count[d, d] >= table.LEAST_MEANS and fast_noise(recording, d) < (
+                 table.LEAST_NOISE * np.sqrt(evidence.swing[d, d] / evidence.count[d, d]))]
+    if group:
+        yield NoMeasurement.of(
+            table.NOISE_FREE, model.drives, group,
+            f'the effort of {named(model.drives, tuple(group))} contains no noise: it looks '
+            'computed, not measured')

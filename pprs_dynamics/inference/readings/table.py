@@ -36,22 +36,32 @@ TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
-# The same, with those that are only named in a question, within this factor.
-TORQUES = {**EFFORTS, 1e2: 'N cm', 1 / 9.80665: 'kgf m', 1 / 0.1129848: 'lbf in', (
-    1 / 7.0615518e-3): 'ozf in'}
-NAMED = 1.25
-# Factors by which masses are off at most in such a unit: the compliance of a controller, times
-# N/m, is near kN, and drives of 0.08 to 0.12 N m/A are near kgf cm.
-OFF_IN_UNIT = {1e3: 3.0, 1e-3: 1.5, KGF_CM: 1.2}
-NEARLY_KGF_CM = 1.05  # a factor within which efforts in kgf cm are no currents
+# Factors within which efforts are in such a unit and no currents, and may be in it: the compliance
+# of a controller, times N/m, is near kN, and drives of 0.08 to 0.12 N m/A are near kgf cm.
+OFF_IN_UNIT = {1e3: (3.0, 3.0), 1e-3: (1.5, 1.5), KGF_CM: (1.05, 1.2)}
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
-# Of one drive among others; other units are those of all drives.
-OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.8  # changes where the bit does, over those of the numbers without a sign
-# Efforts in percent and per mille of the largest of each drive, as multiples of that.
-SHARES = {0.01: 'percent', 1e-3: 'per mille', 1.0: 'a share'}
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
+
+# ---------------------------------------------------------------- efforts that are not measured
+
+COMMAND, POSITION_ERROR, EXTERNAL = 'command', 'position_error', 'external'
+WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
+# What they contain of the model's inertia, gravity and friction, and of friction that grows with
+# the velocity and by its direction, and what they look like.
+LACKING: dict[str, tuple[tuple[int, ...], str]] = {
+    COMMAND: ((0, 1, 0, 0, 0), 'no inertia nor friction: it looks like what a controller '
+              'commands, not like a measurement'),
+    POSITION_ERROR: ((0, 0, 0, 1, 0), 'no inertia nor gravity: it looks like an error of position, '
+                     'which grows with the velocity, not like a measurement'),
+    WITHOUT_GRAVITY: ((1, 0, 1, 1, 1), 'no gravity: it looks as if gravity was already '
+                      'subtracted, or a counterweight bears it'),
+    EXTERNAL: ((0, 0, 1, 1, 1), 'no inertia nor gravity: it looks like an external torque, from '
+               'which a model was already subtracted')}
+LARGEST_COMPLIANCE = 0.01  # [rad/(N m), m/N]: controllers are stiffer than 100 N m/rad
+LEAST_NOISE = 1e-5  # over the swing of an effort, of real sensors
+LEAST_MEANS, STRETCHES = 50, 8  # of an excerpt; evenly over the recording
 
 # ------------------------------------------------------------------------ likelihood and priors
 
@@ -71,9 +81,8 @@ FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
         'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
-        'drive_constant': 10.0, 'velocity_unit': 6.0, 'load': 1.0}
-# Loads at the tool, as shares of the mass that the robot moves.
-LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
+        'effort_absolute': 6.0, 'load': 1.0, 'drive_constant': 10.0, 'velocity_unit': 6.0,
+        COMMAND: 4.0, POSITION_ERROR: 3.0, WITHOUT_GRAVITY: 4.0, EXTERNAL: 4.0}
 UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
 UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
@@ -81,11 +90,15 @@ FEW = 10.0  # more, of positions of some drives in another unit than those of th
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 12.0  # of positions beyond a stroke, and far beyond it
 USED = 0.1  # share of a stroke that recordings use, or more
+# Loads at the tool, as shares of the mass that the robot moves.
+LOADS = (0.03, 0.1, 0.3, 1.0, 3.0)
 BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed limit
 STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
 BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the given one
+# Residual of what nothing explains, over that of a fit with any signs: a spring is no command.
+NO_WORSE = {COMMAND: 1.1, EXTERNAL: 2.0}
 CLOSE_FIT = 2e-3  # residual of every drive with which no other reading is tried
 # The same, with which only other orders of drives are tried, and the prior cost of the masses.
 EXPLAINED, PLAUSIBLE = 0.03, 3.0
@@ -102,23 +115,9 @@ SAME_MASSES = 3.0  # factor by which masses of a description are off at most
 OTHER_UNIT = 1.5  # factor from which on the unit of efforts without a name is a question
 CERTAIN = 3.0  # standard errors
 
-# ---------------------------------------------------------------- efforts that are not measured
-
-COMMAND, POSITION_ERROR, EXTERNAL = 'command', 'position_error', 'external'
-WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
-LEAST_SHARE = 0.5  # of the model's inertia or gravity: with less an effort has none
-LEFT_GRAVITY = 0.2  # share that another model leaves; counterweights leave more
-LEAST_FRICTION = 0.05  # over the swing of an effort: drives with gears have more
-FOLLOWS = 0.9  # share of variance from which an effort follows the velocity and nothing else
-LARGEST_COMPLIANCE = 0.02  # [rad/(N m), m/N]: controllers are stiffer than 50 N m/rad
-LEAST_NOISE, LEAST_LEFT = 1e-5, 5e-4  # over the swing of an effort, of real sensors and drives
-LEAST_MEANS, STRETCHES = 50, 8  # of an excerpt; evenly over the recording
 NORMAL = 1.4826  # standard deviation over the median of absolute values
 STEADY = 0.1  # a weight whose swing is a smaller share of its size is a constant
 NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion [s]
-
-CLEARLY = 3.0  # times that efforts without their sign fit better
-BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 
 # ----------------------------------------------------------------------- columns by their names
 
@@ -230,14 +229,16 @@ class Reading:
         Recorded columns of the drives' positions and efforts.
     effort_scale : (D,) array
         Recorded efforts, as multiples of those in SI units.
-    share : str
-        What share of a drive's largest effort the efforts are; empty where they are none.
     time_unit : float
         [s].
     gravity : (3,) array, optional
         Gravity in the base, if it is not the model's [m/s^2].
     load : float
         At the tool, beyond the model's [kg].
+    contains : tuple of int
+        What efforts contain of the columns of the regression.
+    are_unsigned : bool
+        Whether efforts are recorded without their sign.
     parts : tuple of Reading
         Mistakes of which it is made.
     """
@@ -251,10 +252,11 @@ class Reading:
     positions: Indices
     efforts: Indices
     effort_scale: Array
-    share: str = ''
     time_unit: float = 1.0
     gravity: Array | None = None
     load: float = 0.0
+    contains: tuple[int, ...] = (1, 1, 1, 1, 1)
+    are_unsigned: bool = False
     parts: tuple[Reading, ...] = ()
 
     @classmethod
@@ -274,25 +276,35 @@ class Reading:
         return not self.kinds and bool(np.all(self.effort_scale == 1))
 
     @property
+    def is_no_measurement(self) -> bool:
+        """Whether efforts lack a part of a measurement, or are errors of position under it."""
+        sizes = np.abs(self.effort_scale)
+        return 0 in self.contains or bool(np.all(sizes < LARGEST_COMPLIANCE) and not np.any(
+            np.isin(sizes, SCALES)))
+
+    @property
     def of_motion(self) -> bytes:
         """What decides which forces the model has."""
-        return np.concatenate([self.scale, self.offset, self.positions, [] if (
-            self.gravity is None) else self.gravity, [self.load, self.time_unit]]).tobytes()
+        return np.concatenate([
+            self.scale, self.offset, self.positions, [] if self.gravity is None else self.gravity,
+            [self.load, self.time_unit, self.are_unsigned]]).tobytes()
 
     def after(self, first: Reading) -> Reading:
         """Return the reading that makes the mistakes of another one, and this one."""
         return replace(
             self, cost=first.cost + self.cost, scale=first.scale * self.scale,
             positions=first.positions[self.positions], efforts=first.efforts[self.efforts],
-            offset=first.offset * self.scale + self.offset, load=first.load + self.load,
+            offset=first.offset * self.scale + self.offset,
             time_unit=first.time_unit * self.time_unit,
+            load=first.load + self.load, contains=min(first.contains, self.contains),
+            are_unsigned=first.are_unsigned or self.are_unsigned,
             parts=(*first.parts, *(self.parts or (self,))),
             gravity=first.gravity if self.gravity is None else self.gravity)
 
 
-def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequence[float] = (),
-             times: Sequence[float] = (), are_counts: bool = False,
-             known: Collection[int] = ()) -> list[Reading]:
+def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequence[float],
+             times: Sequence[float], are_counts: bool, are_unsigned: bool, known: Collection[int],
+             ) -> list[Reading]:
     """Return the table of readings of D drives: first the plain one, other orders last.
 
     Parameters
@@ -303,8 +315,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         That may be at the tool [kg].
     times : sequence of float
         Units in which times may be [s].
-    are_counts : bool
-        Whether all angles are whole numbers, as encoders count.
+    are_counts, are_unsigned : bool
+        Whether all angles are whole numbers, as encoders count, and no effort is below 0.
     known : collection of int
         Drives whose positions are read in a unit already.
     """
@@ -320,9 +332,9 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     for unit in times:
         add('time_unit', f'the times look like {TIMES[unit]}: as seconds they make the motion '
             f'{1 / unit:.0f} times too slow for its efforts', (), time_unit=unit)
+    angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for load in loads:
         add('load', '', (), load=load)
-    angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for names, turns in ((LENGTHS, False), (angles, True)):
         alike = tuple(k for k in every if units[k].turns == turns and k not in known)
         for unit, name in names.items():
@@ -345,6 +357,13 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
     for group in _groups(drives, every):
         add('position_sign', f'the {_position(drives, group)} negated', group, ALL_NEGATED * (
             len(group) == len(every) > 1), scale=np.where(np.isin(same, group), -1.0, 1.0))
+    if are_unsigned:
+        add('effort_absolute', f'the effort of {named(drives, every)} looks like its absolute '
+            'value: it is never below 0, where the model changes sign; it must be recorded with '
+            'its sign', every, are_unsigned=True)
+    for kind, (contains, what) in LACKING.items():
+        add(kind, f'the effort of {named(drives, every)} contains {what}', every,
+            contains=contains)
     for k in (k for k in every if units[k].turns):
         for turn, angle in QUARTERS.items():
             add('position_offset', f'the zero of {drives[k]} looks off: {angle} degrees '

@@ -17,7 +17,6 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 
 LONGEST = 1000  # samples of a stretch that are smoothed: 2 s at 500 Hz
 MOST_BLOCKS = 200  # that are kept, of a hundredth of a second each, evenly thinned
-PIECE = 10  # blocks that are followed together where a whole stretch cannot be
 
 
 @dataclass(frozen=True)
