@@ -22,22 +22,10 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    A_P,
-    A_R,
-    AXES,
-    B_P,
-    B_R,
-    KIND,
-    LOOP,
-    OF_CLOSURE,
-    TRANSLATION,
-    residual,
-    row_axis,
-)
 
 SITE, TOOL = '_of_pprs_', 'tool'  # what names of sites of ours begin with; that of the tool
 LEAST_SINGULAR = 1e-8  # of the largest singular value; closures may say a thing twice
@@ -184,14 +172,15 @@ class EngineState:
         position, velocity, acceleration = self.coordinates(links)
         samples, loops, nv = len(position), len(t.closures), model.nv
         frames, moves, turns = (np.zeros((samples, loops, *shape)) for shape in (
-            (OF_CLOSURE, 3), (3, nv), (3, nv)))
+            (tree.OF_CLOSURE, 3), (3, nv), (3, nv)))
         linear, angular = np.empty((2, 3, nv))
         for n in range(samples if loops else 0):
             data.qpos[:] = position[n]
             engine.mj_kinematics(model, data)
             engine.mj_comPos(model, data)
             for k in range(loops):
-                for side, R, p, sign in (('a', A_R, A_P, -1.0), ('b', B_R, B_P, 1.0)):
+                for side, R, p, sign in (('a', tree.A_R, tree.A_P, -1.0),
+                                         ('b', tree.B_R, tree.B_P, 1.0)):
                     site = self.sites[f'{side}{k}']
                     frames[n, k, R:R + 3] = data.site_xmat[site].reshape(3, 3)
                     frames[n, k, p] = data.site_xpos[site]
@@ -199,12 +188,14 @@ class EngineState:
                     moves[n, k] += sign * linear
                     turns[n, k] += sign * angular
         rows = t.rows[:len(t.passive)]
-        of_loop, slides = rows[:, LOOP], rows[:, KIND] == TRANSLATION
-        leads = frames[:, of_loop, A_R:A_R + 3, rows[:, AXES]].swapaxes(0, 1)  # (samples, rows, 3)
-        off = np.einsum('nri,nri->nr', leads, (frames[:, :, B_P] - frames[:, :, A_P])[:, of_loop])
+        of_loop, slides = rows[:, tree.LOOP], rows[:, tree.KIND] == tree.TRANSLATION
+        # (samples, rows, 3)
+        leads = frames[:, of_loop, tree.A_R:tree.A_R + 3, rows[:, tree.AXES]].swapaxes(0, 1)
+        apart = frames[:, of_loop, tree.B_P] - frames[:, of_loop, tree.A_P]
+        off = np.einsum('nri,nri->nr', leads, apart)
         m: Any = SimpleNamespace(loops=np.moveaxis(frames, 0, -1))  # equations on arrays
         for r in np.flatnonzero(~slides).tolist():
-            leads[:, r], off[:, r] = np.array([*row_axis(t, m, r)]).T, residual(t, m, r)
+            leads[:, r], off[:, r] = np.array([*tree.row_axis(t, m, r)]).T, tree.residual(t, m, r)
         self._require_closed(position, off)
         first, drives = len(self._fixed_rows), len(self.drives)
         J = np.empty((samples, first + len(rows), nv))
@@ -241,7 +232,7 @@ class EngineState:
         largest = np.abs(np.column_stack((off, *coupled))).max(axis=0, initial=0.0)
         if np.max(largest, initial=0.0) > OPEN:
             k = int(np.argmax(largest))
-            name = (self.structure.loops[self.structure.tables.rows[k, LOOP]].name
+            name = (self.structure.loops[self.structure.tables.rows[k, tree.LOOP]].name
                     if k < off.shape[1] else self.joints[self.couplings[k - off.shape[1]][0]])
             raise ModelError(name, f'open by {largest[k]:.3g} in MuJoCo',
                              'be closed as in the model: please report this file')

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import (
@@ -40,13 +40,6 @@ from pprs_dynamics.physics.mechanism.structure import (
     build_structure,
     independent_rows,
     opening,
-)
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    NO_FRICTION,
-    Data,
-    Integers,
-    JointFriction,
-    Loads,
 )
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -90,7 +83,7 @@ class LinkMotion:
         return found
 
     @cached_property
-    def motion(self) -> Data:
+    def motion(self) -> tree.Data:
         """The motion by name."""
         return self.structure.evaluation.motion(self.rows)
 
@@ -125,7 +118,7 @@ class LinkMotion:
         implied = np.arange(len(t.passive), len(t.rows))
         if not len(implied):
             return
-        m = Data(*(np.moveaxis(array, 0, -1) for array in self.motion))  # equations on arrays
+        m = tree.Data(*(np.moveaxis(array, 0, -1) for array in self.motion))  # equations on arrays
         residuals = np.stack([tree.residual(t, m, int(r)) for r in implied], axis=-1)
         size = np.abs(residuals) / t.row_unit[implied]
         if np.all(size < tree.OPEN_IN_MOTION):
@@ -151,7 +144,8 @@ class LinkMotion:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
         return tree.link_jacobians(self.structure.tables, self.motion, self.motion.drive_to_joint)
 
-    def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None) -> Loads:
+    def loads(self, inertial: Array, gravity: Array, load: StructureLoad | None = None,
+              ) -> tree.Loads:
         """Return the frictionless loads of joints and closures.
 
         Parameters
@@ -168,7 +162,7 @@ class LinkMotion:
             tree.FORCES | tree.KEPT, self.rows, bodies=(inertial, gravity), loads=table)
         return found
 
-    def friction(self, loads: Loads, friction: JointFriction) -> Array:
+    def friction(self, loads: tree.Loads, friction: tree.JointFriction) -> Array:
         """Return the drives' efforts against friction of joints under loads, (N, D)."""
         efforts: Array = np.zeros((len(self.rows), len(self.structure.drives)))
         # Loads are everybody's: what is of one friction alone does not go through them.
@@ -217,7 +211,7 @@ class LinkMotion:
         return found
 
     def changes_by_loads(
-        self, loads: Loads, friction: JointFriction, guides: Integers, count: int,
+        self, loads: tree.Loads, friction: tree.JointFriction, guides: Integers, count: int,
         added: Sequence[tuple[Any, ...]], bodies: Sequence[Array],
         applied: Sequence[tuple[int, int]] = (), wrenches: Sequence[Array] = (),
         quantities: int = 1,
@@ -243,14 +237,14 @@ class LinkMotion:
         """Return the derivatives of the efforts by the parameters of bodies, (N, D, 10 B)."""
         unit = np.hstack((np.eye(PARAMETERS), np.tile(-gravity, (PARAMETERS, 1))))
         added = [(k, row, tree.AS_LINK) for k, row in enumerate(np.repeat(rows, PARAMETERS))]
-        found = self.changes_by_loads(self._no_loads()[1], NO_FRICTION, NO_GUIDES, len(added),
+        found = self.changes_by_loads(self._no_loads()[1], tree.NO_FRICTION, NO_GUIDES, len(added),
                                       added, [*unit] * len(rows))
         return np.moveaxis(found[:, :, 0], 0, -1)
 
-    def _no_loads(self) -> tuple[Array, Loads]:
+    def _no_loads(self) -> tuple[Array, tree.Loads]:
         sizes = self.structure.evaluation.sizes
-        table = np.zeros((len(self.rows), tree.length_of(Loads, sizes)))
-        return table, tree.views(Loads, sizes, table)
+        table = np.zeros((len(self.rows), tree.length_of(tree.Loads, sizes)))
+        return table, tree.views(tree.Loads, sizes, table)
 
 
 class ToolPose:

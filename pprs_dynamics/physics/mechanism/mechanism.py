@@ -40,20 +40,6 @@ from pprs_dynamics.physics.mechanism.state import (
     StructureLoad,
 )
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    EFFORTS,
-    FORCES,
-    GUIDE,
-    JOINT_EFFORT,
-    LOAD,
-    MOTION,
-    NO_FRICTION,
-    RIGID,
-    TRANSMITTED,
-    WORST_CONDITION,
-    InverseDynamicsResult,
-    JointFriction,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +162,7 @@ class Mechanism:
         return next((joint.joints for joint in self.passive_joints if joint.name == name), (name,))
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
-                       ) -> JointFriction:
+                       ) -> tree.JointFriction:
         """Return friction of joints as `MechanismState.friction_efforts` takes it.
 
         Parameters
@@ -200,9 +186,10 @@ class Mechanism:
         slides = [row >= 0 and not structure.tables.turns[row] for row in joint]
         radius = np.array([1.0 if slide else float(block.get('radius', 0.0))
                            for slide, block in zip(slides, blocks.values(), strict=True)])
-        return JointFriction(joint, loop, viscous, torque, coulomb * radius,
-                             np.array([widths.get(name, reversal.slide if slide else reversal.rate)
-                                       for name, slide in zip(blocks, slides, strict=True)]))
+        return tree.JointFriction(
+            joint, loop, viscous, torque, coulomb * radius,
+            np.array([widths.get(name, reversal.slide if slide else reversal.rate)
+                      for name, slide in zip(blocks, slides, strict=True)]))
 
     def with_body(self, link: str, parameters: Array) -> Self:
         """Return the mechanism with a body more on a link.
@@ -296,9 +283,9 @@ class Mechanism:
         still = np.zeros_like(position)
         return JointMotion(position, still, still, np.arange(samples, dtype=float))
 
-    def state(self, motion: Any, reversal: Reversal, friction: Any = NO_FRICTION,
+    def state(self, motion: Any, reversal: Reversal, friction: Any = tree.NO_FRICTION,
               closed: dict[Any, Array] | None = None,
-              found: InverseDynamicsResult | None = None) -> MechanismState:
+              found: tree.InverseDynamicsResult | None = None) -> MechanismState:
         """Return the state for a motion; `closed` as of `ModelState`, `found` as of `one_pass`."""
         closed = {} if closed is None else closed
         start, nearby = None, closed.get(self.structure)
@@ -310,7 +297,7 @@ class Mechanism:
                                start=start, nearby=nearby, friction=friction)
         if found is not None:
             found = found if found.q is not None else found._replace(q=start)
-            vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
+            vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[tree.RIGID])
         return state
 
     def remember(self, state: MechanismState, closed: dict[Any, Array]) -> None:
@@ -349,18 +336,19 @@ class Mechanism:
                     for row, wrench in links.wrenches(load):
                         applied.append((k, row))
                         wrenches.append(sign * wrench)
-        efforts = np.empty((EFFORTS, *state.position.shape))
-        efforts[TRANSMITTED], efforts[JOINT_EFFORT], efforts[LOAD] = (
+        efforts = np.empty((tree.EFFORTS, *state.position.shape))
+        efforts[tree.TRANSMITTED], efforts[tree.JOINT_EFFORT], efforts[tree.LOAD] = (
             state.transmitted, state.friction_efforts(state.friction), state.friction_load)
         for other, change in zip(others, links.changes_by_loads(
                 state.reactions, state.friction, self.guides, len(others), added, bodies, applied,
                 wrenches, 3 if self.has_guides else 2), strict=True):
             found = replace(other, friction=state.friction)
             changed = efforts.copy()
-            changed[[TRANSMITTED, JOINT_EFFORT, LOAD][:change.shape[1]]] += change.swapaxes(0, 1)
+            parts = [tree.TRANSMITTED, tree.JOINT_EFFORT, tree.LOAD][:change.shape[1]]
+            changed[parts] += change.swapaxes(0, 1)
             if not self.has_guides:
-                changed[LOAD] = np.abs(changed[TRANSMITTED])
-            vars(found)['inverse_dynamics'] = InverseDynamicsResult(
+                changed[tree.LOAD] = np.abs(changed[tree.TRANSMITTED])
+            vars(found)['inverse_dynamics'] = tree.InverseDynamicsResult(
                 links.motion.q, changed, (state.position, state.velocity, state.acceleration))
             yield found
 
@@ -369,12 +357,12 @@ class Mechanism:
         drives = range(len(self.drives))
         added = [(drive, row, tree.WITH_DRIVE + drive) for drive in drives for row in self.bodies]
         found = state.links.changes_by_loads(
-            state.reactions, NO_FRICTION, NO_GUIDES, len(drives), added,
+            state.reactions, tree.NO_FRICTION, NO_GUIDES, len(drives), added,
             [np.append(self.by_joint[row], np.zeros(3)) for _, row, _ in added])
         inertia: Array = found[:, :, 0] + np.diag(self.armature)[:, None]
         return inertia
 
-    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
+    def inverse_dynamics(self, state: MechanismState) -> tree.InverseDynamicsResult | None:
         """Return closed coordinates, efforts and own friction in one pass."""
         nearby = {} if state.nearby is None else {self.structure: state.nearby}
         return self.one_pass(state, self.friction_parameters(state.friction), nearby,
@@ -384,7 +372,7 @@ class Mechanism:
         """Return friction of joints, and of drives (OF_DRIVE, D) or none, for `one_pass`."""
         drives = np.array(self.structure.evaluation.no_actuators if drives is None else drives)
         if self.has_guides:
-            drives[GUIDE] = self.guides
+            drives[tree.GUIDE] = self.guides
         return np.array(joints), drives
 
     @cached_property
@@ -394,7 +382,7 @@ class Mechanism:
                         dtype=np.int64)
 
     def one_pass(self, motion: Any, parameters: Any, closed: dict[Any, Array] | None,
-                 start: Array | None = None) -> InverseDynamicsResult | None:
+                 start: Array | None = None) -> tree.InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
         None for a motion of the tool, and where a sample is out of reach or singular.
@@ -414,21 +402,22 @@ class Mechanism:
         structure, moved = self.structure, (motion.position, motion.velocity, motion.acceleration)
         given = np.array(moved)
         q, efforts = np.empty((len(motion), len(structure.home))), np.empty(
-            (EFFORTS, *given.shape[1:]))
+            (tree.EFFORTS, *given.shape[1:]))
         failed = structure.evaluation.run(
-            MOTION | FORCES, None, given, start, None if closed is None else closed.get(structure),
+            tree.MOTION | tree.FORCES, None, given, start,
+            None if closed is None else closed.get(structure),
             (self.by_joint, self.gravity_row), None, (*parameters, q, efforts))
         if failed >= 0:
             return None
         if closed is not None and structure.loops and len(motion):
             closed[structure] = q[-1].copy()
-        return InverseDynamicsResult(q, efforts, moved)
+        return tree.InverseDynamicsResult(q, efforts, moved)
 
     def friction_load(self, state: MechanismState) -> Array:
         """Return the loads of the drives' guides or gears [N m, N], (N, D)."""
         if state.inverse_dynamics is not None or not self.has_guides:
             return np.abs(state.transmitted) if state.inverse_dynamics is None else (
-                state.inverse_dynamics.efforts[LOAD])
+                state.inverse_dynamics.efforts[tree.LOAD])
         across = np.cross(state.reactions.f[:, self.guides], state.links.motion.z[:, self.guides])
         load: Array = np.linalg.norm(across, axis=2)
         return load
@@ -441,7 +430,7 @@ class Mechanism:
         """Return 1 minus the condition number of the closures over its limit; None without any."""
         if not self.structure.loops:
             return None
-        return float(1 - state.links.condition.max() / WORST_CONDITION)
+        return float(1 - state.links.condition.max() / tree.WORST_CONDITION)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return the loads of the gears."""

@@ -19,14 +19,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    JOINT_EFFORT,
-    NO_FRICTION,
-    TRANSMITTED,
-    InverseDynamicsResult,
-)
 
 Motion = JointMotion | PlatformMotion
 # Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
@@ -156,7 +151,7 @@ class MechanismState(JointMotion):
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Any = field(default=None, kw_only=True)
-    friction: Any = field(default=NO_FRICTION, kw_only=True)
+    friction: Any = field(default=tree.NO_FRICTION, kw_only=True)
     start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
 
@@ -173,11 +168,11 @@ class MechanismState(JointMotion):
         return drives
 
     @cached_property
-    def inverse_dynamics(self) -> InverseDynamicsResult | None:
+    def inverse_dynamics(self) -> tree.InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
-        found: InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
+        found: tree.InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
         return found
 
     @cached_property
@@ -216,7 +211,7 @@ class MechanismState(JointMotion):
         The motor accelerates its rotor on its own side of the gear.
         """
         efforts: Array = (self.reactions.efforts if self.inverse_dynamics is None
-                          else self.inverse_dynamics.efforts[TRANSMITTED])
+                          else self.inverse_dynamics.efforts[tree.TRANSMITTED])
         return efforts
 
     @cached_property
@@ -245,7 +240,7 @@ class MechanismState(JointMotion):
     def friction_efforts(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
         efforts: Array = (
-            self.inverse_dynamics.efforts[JOINT_EFFORT]
+            self.inverse_dynamics.efforts[tree.JOINT_EFFORT]
             if friction is self.friction and self.inverse_dynamics is not None
             else self.links.friction(self.reactions, friction))
         return efforts

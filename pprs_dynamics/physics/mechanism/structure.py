@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.errors import ModelError, UnknownNameError
+from pprs_dynamics.physics.mechanism import tree_equations as tree
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -36,20 +37,6 @@ from pprs_dynamics.physics.mechanism.description import (
     Loop,
     inertial_in,
     moved_along,
-)
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    ANGLE,
-    AXES,
-    KIND,
-    LOOP,
-    MEASURE,
-    OF_CLOSURE,
-    TRANSLATION,
-    Evaluation,
-    Integers,
-    Model,
-    constraint_jacobian,
-    link_jacobians,
 )
 from pprs_dynamics.physics.mechanism.vectors import rotation_matrix
 
@@ -68,17 +55,17 @@ SPIN = 0.02  # weight of how far a centre of mass moves when a held coordinate d
 
 
 def _along(axis: int) -> Row:
-    return TRANSLATION, (axis, 0, 0, 0), (1.0, 0.0)
+    return tree.TRANSLATION, (axis, 0, 0, 0), (1.0, 0.0)
 
 
 def _square(a: int, b: int) -> Row:
-    return ANGLE, (a, b, 0, 0), (1.0, 0.0)
+    return tree.ANGLE, (a, b, 0, 0), (1.0, 0.0)
 
 
 def _turn(axis: int) -> Row:
     """Return the rotation about an axis: half of two products, zero only where frames agree."""
     j, k = (axis + 1) % 3, (axis + 2) % 3
-    return ANGLE, (j, k, k, j), (0.5, -0.5)
+    return tree.ANGLE, (j, k, k, j), (0.5, -0.5)
 
 
 POINT = (_along(X), _along(Y), _along(Z))
@@ -130,13 +117,13 @@ class Closing:
     loops : list of str
     """
 
-    def __init__(self, t: Model, names: list[str], loops: list[str]) -> None:
+    def __init__(self, t: tree.Model, names: list[str], loops: list[str]) -> None:
         self.t, self.names, self.loops = t, names, loops
-        self.columns, self.rows = t.units[:, MEASURE], 1 / t.row_unit
+        self.columns, self.rows = t.units[:, tree.MEASURE], 1 / t.row_unit
 
     def derivatives(self, q: Array) -> tuple[Array, Array]:
         """Return rows (r,) and their derivatives by all coordinates (r, C), in units of size."""
-        residuals, J, _ = constraint_jacobian(self.t, q, np.arange(len(q)))
+        residuals, J, _ = tree.constraint_jacobian(self.t, q, np.arange(len(q)))
         return residuals * self.rows, self.rows[:, None] * J * self.columns
 
     def home(self, q: Array, free: Integers) -> Array:
@@ -160,17 +147,18 @@ class Closing:
 
     def _require_closed(self, q: Array) -> None:
         t = self.t
-        residuals, _, m = constraint_jacobian(t, q, np.arange(len(q)))
+        residuals, _, m = tree.constraint_jacobian(t, q, np.arange(len(q)))
         worst = np.abs(residuals * self.rows)
         if np.max(worst, initial=0.0) > OPEN:
             row = int(np.argmax(worst))
-            name, kind = self.loops[t.rows[row, LOOP]], t.rows[row, KIND]
+            name, kind = self.loops[t.rows[row, tree.LOOP]], t.rows[row, tree.KIND]
             raise ModelError('robot.loops', name, 'close at home: it is open by '
                              f'{opening(kind, residuals[row])}, and '
                              'no position of the passive joints nearby closes it (check frames, '
                              'lengths, and robot.home)')
         for k, name in enumerate(self.loops):
-            kinds = {tuple(row[AXES:]) for row in t.rows if row[LOOP] == k and row[KIND] == ANGLE}
+            kinds = {tuple(row[tree.AXES:]) for row in t.rows
+                     if row[tree.LOOP] == k and row[tree.KIND] == tree.ANGLE}
             along = np.einsum('ij,ij->j', m.A[0, k], m.B[0, k])
             if (X, Z, 0, 0) in kinds and along[Z] < 0:
                 raise ModelError('robot.loops', name, 'have both axes z the same way: they are '
@@ -235,7 +223,7 @@ class Closing:
 
 def opening(kind: int, residual: float) -> str:
     """Return by how much a row of a loop is open, with its unit."""
-    return (f'{1e3 * abs(residual):.3g} mm' if kind == TRANSLATION
+    return (f'{1e3 * abs(residual):.3g} mm' if kind == tree.TRANSLATION
             else f'{np.degrees(abs(residual)):.3g} degrees')
 
 
@@ -271,7 +259,8 @@ def independent_rows(rows: Array, most: int, groups: Sequence[slice] = (np.s_[:]
     return np.sort(_integers(chosen))
 
 
-def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, q: Array) -> Model:
+def with_determined_coordinates(t: tree.Model, rows: Integers, passive: Integers, q: Array,
+                                ) -> tree.Model:
     """Return tables whose first rows determine passive coordinates.
 
     Coordinates that few rows depend on come first: fewer zeros then fill up in the elimination.
@@ -284,7 +273,7 @@ def with_determined_coordinates(t: Model, rows: Integers, passive: Integers, q: 
     q : (C,) array
         Home, where the loops close.
     """
-    _, J, _ = constraint_jacobian(t, q, passive)
+    _, J, _ = tree.constraint_jacobian(t, q, passive)
     passive = passive[np.argsort(np.count_nonzero(J[rows], axis=0), kind='stable')]
     every = np.concatenate((rows, np.setdiff1d(np.arange(len(t.rows)), rows)))
     places, count = t.places.copy(), len(passive)
@@ -326,7 +315,7 @@ class Structure:
     """
 
     description: Description
-    tables: Model
+    tables: tree.Model
     drives: tuple[str, ...]
     kinds: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -350,9 +339,9 @@ class Structure:
         return self.mobility.home
 
     @cached_property
-    def evaluation(self) -> Evaluation:
+    def evaluation(self) -> tree.Evaluation:
         """Its equations."""
-        return Evaluation(self.tables, self.home)
+        return tree.Evaluation(self.tables, self.home)
 
     @cached_property
     def inertial(self) -> Array:
@@ -534,7 +523,7 @@ class _Builder:
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
         self.gain[row] = ratio, offset
 
-    def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> Model:
+    def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> tree.Model:
         """Return tables with all rows of the loops, and no passive coordinates yet."""
         placed = [(*self._on(loop, 'a'), *self._on(loop, 'b')) for loop in loops]
         rows = [(k, row) for k, loop in enumerate(loops) for row in ROWS[loop.kind]]
@@ -550,7 +539,7 @@ class _Builder:
         driven = _integers([self.coordinate[self.rows[name]] for name in drives])
         places, slides = np.full(len(self.coordinates), -1), np.array(self.slides, dtype=bool)
         places[driven] = np.arange(len(driven))
-        return Model(
+        return tree.Model(
             joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
             passive=_integers([]), drives=driven, places=places,
             closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
@@ -562,8 +551,8 @@ class _Builder:
             units=np.column_stack((np.where(slides, STRIDE_SLIDE * size, STRIDE_TURN),
                                    np.where(slides, size, 1.0))),
             closure_frames=np.array([[*a.R, a.p, *b.R, b.p] for _, a, _, b in placed],
-                                    dtype=float).reshape(-1, OF_CLOSURE, 3),
-            row_reals=np.array([(*row[2], size if row[0] == TRANSLATION else 1.0)
+                                    dtype=float).reshape(-1, tree.OF_CLOSURE, 3),
+            row_reals=np.array([(*row[2], size if row[0] == tree.TRANSLATION else 1.0)
                                 for _, row in rows], dtype=float).reshape(-1, 3))
 
     def _on(self, loop: Loop, side: str) -> tuple[int, Frame]:
@@ -702,9 +691,9 @@ def _require_joints(description: Description, drives: tuple[str, ...],
                              'or prismatic joint that mimics none')
 
 
-def _size(t: Model, q: Array) -> float:
+def _size(t: tree.Model, q: Array) -> float:
     """Return the mean distance of joints and closures from the base's origin [m]."""
-    _, _, m = constraint_jacobian(t, q, np.arange(len(q)))
+    _, _, m = tree.constraint_jacobian(t, q, np.arange(len(q)))
     points = np.concatenate((m.p[0, 1:], m.pA[0], m.pB[0]))
     return max(float(np.mean(np.linalg.norm(points, axis=1))), 1e-3)
 
@@ -712,8 +701,8 @@ def _size(t: Model, q: Array) -> float:
 def _moves(structure: Structure) -> Array:
     """Return the tool's motion and that of all centres of mass per rate of each coordinate."""
     t, size, home = structure.tables, structure.size, structure.home
-    _, _, m = constraint_jacobian(t, home, np.arange(len(home)))
-    W, U = (jacobian[0] for jacobian in link_jacobians(t, m, np.eye(len(home))[None]))
+    _, _, m = tree.constraint_jacobian(t, home, np.arange(len(home)))
+    W, U = (jacobian[0] for jacobian in tree.link_jacobians(t, m, np.eye(len(home))[None]))
     row, frame = structure.links[structure.tool]
     moves = [(U[row] + np.cross(W[row], m.R[0, row] @ frame.p, axis=0)) / size, W[row]]
     for body, parameters in enumerate(structure.inertial):
