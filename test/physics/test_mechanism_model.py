@@ -97,7 +97,7 @@ FLOATING = ('<link name="world"/><joint name="free" type="floating"><parent link
 
 
 @pytest.mark.parametrize(('text', 'words'), [
-    (arm.urdf(mimic='<mimic joint="turn"/>'), 'mimics turn'),
+    (arm.urdf(mimic='<mimic joint="turn"/>'), "'swing', must .*mimic no other joint"),
     (arm.urdf(more=TRANSMISSION), 'transmission'), (arm.urdf(more=FLOATING), 'floating'),
     (arm.urdf(more='<link name="beam"/>'), 'two links beam'),
     (arm.urdf().replace('"1.5"', '"heavy"'), 'value of <mass> is "heavy", must be a finite'),
@@ -128,6 +128,8 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
     ('base: stand', 'base: beam', r'that no joint moves, but swing \(revolute\) does'),
     ('urdf: made_up.urdf', 'urdf: none.urdf', 'none.urdf'),
     ('drives: [turn, swing, reach]', 'drives: []', r'drives is \[\], must be a list of names'),
+    ('drives: [turn, swing, reach]', 'drives: [turn, swing, turn]', 'name each joint once'),
+    ('drives: [turn, swing, reach]', 'drives: [turn, swing, reech]', 'did you mean reach'),
     ('base: stand', 'base: stand\n      gane: [1.0, 2.0, 3.0]', 'did you mean robot.gain'),
 ])
 def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: str,

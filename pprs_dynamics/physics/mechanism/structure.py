@@ -659,25 +659,18 @@ def _undriven(description: Description, drives: tuple[str, ...], home: Mapping[s
 
 def _require_joints(description: Description, drives: tuple[str, ...],
                     home: Mapping[str, float], locked: Mapping[str, float]) -> None:
-    listed, joints = 'robot.drives', description.joints
+    joints = description.joints
     if len(set(drives)) < len(drives):
-        raise ModelError(listed, list(drives), 'name each joint once')
+        raise ModelError('robot.drives', list(drives), 'name each joint once')
     moving = [name for name, joint in joints.items() if joint.kind != FIXED]
-    for name in drives:
-        if name not in joints:
-            raise ModelError(listed, name, 'be joints of the URDF: '
-                             f'{", ".join(moving[:40]) or "none"}')
-        joint = joints[name]
-        if joint.kind not in (*TURNING, PRISMATIC):
-            raise ModelError(listed, name, 'be revolute, continuous or prismatic, but is of the '
-                             f'type {joint.kind} in the description')
-        if joint.mimic is not None:
-            raise ModelError(listed, name, f'move by itself, but mimics {joint.mimic.joint} in '
-                             'the URDF')
-    for key, names in (('robot.home', home), ('robot.locked', locked)):
+    for key, names in (('robot.drives', drives), ('robot.home', home), ('robot.locked', locked)):
         for name in names:
             if name not in joints:
                 raise UnknownNameError('joint', name, moving, key)
+            if key != 'robot.home' and (joints[name].kind not in (*TURNING, PRISMATIC)
+                                        or joints[name].mimic is not None):
+                raise ModelError(key, name, 'be revolute, continuous or prismatic, and mimic no '
+                                 'other joint, in the description')
     for name in locked:
         if name in drives:
             raise ModelError(f'robot.locked.{name}', locked[name],
@@ -686,9 +679,6 @@ def _require_joints(description: Description, drives: tuple[str, ...],
         if not lower <= locked[name] <= upper:
             raise ModelError(f'robot.locked.{name}', locked[name],
                              f'be within its limits, {lower:g} to {upper:g}')
-        if joints[name].kind not in (*TURNING, PRISMATIC) or joints[name].mimic is not None:
-            raise ModelError(f'robot.locked.{name}', locked[name], 'be of a revolute, continuous '
-                             'or prismatic joint that mimics none')
 
 
 def _size(t: tree.Model, q: Array) -> float:
