@@ -16,7 +16,7 @@ from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import UsageError, add_shared, whole
 from pprs_dynamics.app.workbench.server.hub import Hub, Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
-from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.errors import optional_library
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
@@ -77,12 +77,9 @@ def _ros_name(text: str) -> str:
 
 
 def _live(options: argparse.Namespace, model: DriveModel) -> Any:
+    live = optional_library('pprs_dynamics.ros.live_joint_states', 'rclpy', 'live data', 'ros')
     try:
-        from pprs_dynamics.ros.live_joint_states import LiveNodes
-    except ImportError:
-        raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    try:
-        return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                         arguments=['--ros-args', *options.ros_args])
+        return live.LiveNodes(model, options.live_topic or options.topic or 'joint_states',
+                              arguments=['--ros-args', *options.ros_args])
     except RuntimeError as error:  # the public base of rclpy's own
         raise UsageError(f'--ros-args: {" ".join(str(error).split())}') from None

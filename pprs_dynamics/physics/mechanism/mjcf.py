@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MissingLibraryError, ModelError, UnreadableFileError
+from pprs_dynamics.errors import ModelError, UnreadableFileError, optional_library
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -53,10 +53,7 @@ def read_mjcf(path: str) -> Description:
     ModelError
         For a constraint that is no loop and no linear coupling.
     """
-    try:
-        import mujoco
-    except ImportError:
-        raise MissingLibraryError('mujoco', 'a model from MJCF', 'sim') from None
+    mujoco = optional_library('mujoco', 'mujoco', 'a model from MJCF', 'sim')
     content = read_content(path)
     model = readable_spec(mujoco, path).compile()
     return _Reader(mujoco, model, path).description(hashlib.sha256(content).hexdigest())

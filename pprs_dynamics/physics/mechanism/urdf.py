@@ -23,6 +23,7 @@ import numpy as np
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.physics.mechanism import description
 from pprs_dynamics.system.files import readable, require_file
+from pprs_dynamics.system.plain_text import first_of
 
 WORLD = 'world'
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
@@ -162,22 +163,19 @@ def _unused(robot: ElementTree.Element, joints: dict[str, description.Joint],
               if link.get('name') in carried and link.find('inertial') is None
               and link.find('collision') is not None]
     if hollow:
-        yield f'links with a shape and no <inertial>, which weigh nothing here: {_listed(hollow)}'
+        yield ('links with a shape and no <inertial>, which weigh nothing here: '
+               f'{first_of(hollow, MOST_NAMES)}')
     rubbing = [joint.get('name', '') for joint in robot.findall('joint')
                if any(_number(joint.find('dynamics'), key, 0.0) for key in DYNAMICS)]
     if rubbing:
-        yield (f'<dynamics> of {_listed(rubbing)} is not used: friction is that of the model '
-               'file, or of pprs fit')
+        yield (f'<dynamics> of {first_of(rubbing, MOST_NAMES)} is not used: friction is that of '
+               'the model file, or of pprs fit')
     used = {name for name, joint in joints.items() if joint.reduction}
     left = [unused.name or unused.kind for unused in transmissions
             if not unused.joints or not used & set(unused.joints)]
     if left:
-        yield (f'<transmission> {_listed(left)} is not used: only a simple one with a reduction, '
-               'of a joint that turns, is; write gear_ratio')
-
-
-def _listed(names: list[str]) -> str:
-    return ', '.join(names[:MOST_NAMES]) + (', ...' if len(names) > MOST_NAMES else '')
+        yield (f'<transmission> {first_of(left, MOST_NAMES)} is not used: only a simple one with '
+               'a reduction, of a joint that turns, is; write gear_ratio')
 
 
 def _read(path: str, elements: list[ElementTree.Element],
@@ -226,12 +224,9 @@ def _inertial(link: ElementTree.Element) -> np.ndarray:
     mass = _number(inertial.find('mass'), 'value', 0.0)
     xx, xy, xz, yy, yz, zz = (_number(inertia, f'i{axes}', 0.0)
                               for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz'))
-    if mass < 0 or min(xx, yy, zz) < 0:
+    if not 0 <= min(mass, xx, yy, zz) <= max(mass, xx, yy, zz) <= LARGEST_BODY:
         raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
-                         f'{zz:g} kg m^2: none may be negative')
-    if max(mass, xx, yy, zz) > LARGEST_BODY:
-        raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
-                         f'{zz:g} kg m^2: none may be above {LARGEST_BODY:g}')
+                         f'{zz:g} kg m^2: none may be negative, or above {LARGEST_BODY:g}')
     R = description.rotation_of(_numbers(origin, 'rpy', '0 0 0'))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return description.body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
