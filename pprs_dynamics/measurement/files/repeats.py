@@ -28,8 +28,6 @@ def shared_samples(first: Recording, second: Recording) -> int:
 
     Positions and efforts are compared, not times: another format may count them from elsewhere.
     """
-    if first.drives != second.drives:
-        return 0
     ours, theirs = _windows(first), _windows(second)
     same = np.isin(theirs, ours[ours > 0]) & (theirs > 0)
     covered = np.zeros(len(second.time) + 1, dtype=np.int64)

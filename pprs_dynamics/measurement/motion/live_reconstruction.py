@@ -73,12 +73,10 @@ class LiveReconstruction:
         """Take a sample, and return the middle of the window once that is full.
 
         A stamp that is not later than the last, or later by more than 3.5 steps, is a gap: the
-        window starts again, as where more than a quarter of it is missing. A sample with a position
-        that is not finite is left out, and so missing. What is missing has no answer of its own.
+        window starts again, as where more than a quarter of it is missing. What is missing has no
+        answer of its own.
         """
         q, F = np.array(position, dtype=float), np.array(effort, dtype=float)
-        if not np.isfinite(time) or not np.all(np.isfinite(q)):
-            return None
         if self._window and (last := self._window[-1]) is not None:
             self._go_on((time - last[0]) / self.polynomial.step)
         self._window.append((time, q, F))

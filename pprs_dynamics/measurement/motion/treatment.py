@@ -95,8 +95,6 @@ class Treatment:
         A block with a NaN has none: a measurement that is missing is not made up.
         """
         values = np.asarray(values, dtype=float)
-        if len(values) != self.samples:
-            raise ValueError(f'{len(values)} samples for a treatment of {self.samples}')
         sums = np.add.reduceat(values, self.starts, axis=0)
         return sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
 
