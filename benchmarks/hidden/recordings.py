@@ -49,6 +49,7 @@ IN_CATALOGUE = tuple(name for name in NAMES if name not in (
     *NOT_IN_CATALOGUE, 'counterbalance', 'eccentric_encoder', 'elastic_joint', 'coupled_drives',
     'current_gain'))
 DURATION, RATE = 40.0, 500.0  # [s, Hz]
+ROUNDS = 4  # of loads with friction in them
 LEAD = 50  # samples before the recording, for what looks back in time
 NOISE = 0.08  # [N], of which 70 % of the variance is correlated
 QUIETEST = 0.01  # [N]; an effect that would need less is drawn anew
@@ -137,7 +138,7 @@ class Scene:
         """Let the robot move along the motion of a seed."""
         self.path, self.platform, motion = _motion(seed, self.duration)
         self.plain = PlainRobot(simulated(
-            self.model, self.robot, self.drive_width, self.passive_width), motion)
+            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS)
         kept = len(motion) - LEAD
         self.treat = Treatment(np.arange(0, kept, self.block), kept)
         self._refits: dict[str | float, Refit] = {}

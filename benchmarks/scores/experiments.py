@@ -29,6 +29,7 @@ import numpy as np
 
 from benchmarks.hidden.effort_noise import EffortNoise
 from benchmarks.hidden.recordings import (
+    ROUNDS,
     driven,
     noise_settings,
     simulated,
@@ -82,7 +83,7 @@ class HiddenRobot:
 
     def record(self, motion: PlatformMotion, run: int) -> Recording:
         """Return a recording of a motion; `run` seeds its noise."""
-        plain = PlainRobot(simulated(self.model, self.values), driven(self.model, motion))
+        plain = PlainRobot(simulated(self.model, self.values), driven(self.model, motion), ROUNDS)
         run_along = Injection(plain, [self.effect], np.random.default_rng((self.seed, CLIMATE)))
         settings = noise_settings(CORRELATION, NOISE)
         noise = EffortNoise(settings, np.random.default_rng((self.seed, 4, run))).samples(
