@@ -11,12 +11,10 @@ with Gaussian priors of precision Lambda about 0 has the penalised deviance
     D = \sum_{d, k} \left( \ln S_d + \frac{r_d^2}{S_d} \right) + c^T \Lambda c
         + \ln \det (H + \Lambda) - \ln \det \Lambda, \qquad H = \sum_d X_d^T S_d^{-1} X_d,
 
--2 ln of the likelihood with the coefficients integrated out (restricted likelihood), but for a
-constant. Coefficients and noise are fitted in turn until it stands still.
-
-References
-----------
-D. G. Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12 (1965) 547-560.
+-2 ln of the likelihood with the coefficients integrated out (restricted likelihood). Coefficients
+and noise are fitted in turn, without the constants, until D stands still. Then the coefficients are
+fitted once more, to the constants as well. With the constants in each turn, what they leave would
+change the noise, and the noise their weight, back and forth for ever.
 """
 
 from __future__ import annotations
@@ -51,7 +49,6 @@ LEAST_POSES = 10  # that are held: their errors are independent
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
 CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
-MOST_BEYOND, MOST_BACK = 2.0, 0.6  # of the last round's change of the noise, when it is accelerated
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 8000  # products of blocks on a drive, both ways, that are kept: some 10 kB each
 
@@ -249,38 +246,21 @@ class Regression:
             A fit or the amplitudes of the noise to start from.
         """
         system, shapes = self.system(blocks), self.noise_shapes
-        found = self._solved(system, blocks, shapes.start(system.squares, self.counts)
-                             if start is None else start)
-        last, steps = np.inf, list[tuple[Array, Array]]()
-        for _ in range(MOST_ROUNDS - 1):
-            before = found.deviance
-            fitted = shapes.fitted(found.amplitudes, found.squares, self.counts,
-                                   system.leverage(found.covariance, found.spectra))
-            steps = [*steps[-1:], (fitted, np.log(fitted @ shapes.at_bands[:, 1:]
-                                                  / found.spectra[:, 1:]))]
-            found = self._solved(system, blocks, self._accelerated(*steps))
+        amplitudes = (shapes.start(system.squares, self.counts) if start is None
+                      else start.amplitudes if isinstance(start, JointFit) else start)
+        before = last = np.inf
+        for number in range(MOST_ROUNDS):
+            spectra = shapes.without_constants(amplitudes)
+            found = system.solve(spectra, self.counts)
             change = abs(before - found.deviance)
             # Changes fall as a geometric series: the next one is change^2 / last.
-            if change < CONVERGED or (change < last and change ** 2 < CONVERGED * last / 2
-                                      and change < NEARLY):
+            if number and (change < CONVERGED or (
+                    change < min(last, NEARLY) and change ** 2 < CONVERGED * last / 2)):
                 break
-            last = change
-        return found
-
-    def _accelerated(self, before: tuple[Array, Array], last: tuple[Array, Array] | None = None,
-                     ) -> Array:
-        """Return amplitudes (D, J + 1) to go on with (Anderson's method of depth 1, by drive).
-
-        Of those fitted in the last rounds, and by how much the logarithms of their power (D, B - 1)
-        moved. Without it, noise that columns explain as well changes back and forth for ever.
-        """
-        if last is None:
-            return before[0]
-        change, counts = last[1] - before[1], self.counts[:, 1:]
-        share = np.clip(np.sum(counts * last[1] * change, axis=1) / np.maximum(
-            np.sum(counts * change ** 2, axis=1), 1e-12), -MOST_BEYOND, MOST_BACK)
-        mixed = last[0] - share[:, None] * (last[0] - before[0])
-        return np.where(mixed > 0, mixed, np.minimum(last[0], before[0]))
+            before, last = found.deviance, change
+            amplitudes = shapes.fitted(amplitudes, found.squares, self.counts,
+                                       system.leverage(found.covariance, spectra))
+        return self._solved(system, blocks, amplitudes)
 
     def at(self, blocks: Sequence[Block], noise: JointFit | Array) -> JointFit:
         """Return the fit of blocks under the noise of another fit, or of given amplitudes."""

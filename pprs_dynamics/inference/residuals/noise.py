@@ -60,6 +60,7 @@ PRIOR_DRIVES = 4
 # Steps of scoring to a description, whose two amplitudes change by 1 % after them; the best of the
 # last few counts.
 DESCRIBED, COMPARED = 6, 2
+NO_WEIGHT = 1e15  # noise of a constant over that of the shapes, with which no constant counts
 SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
 LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: no spectrum is 0
 # [N^2], of a rounding of 1e-12 N, which nothing resolves: squares of it are no zeros yet.
@@ -114,6 +115,12 @@ class NoiseShapes:
         """
         power: Array = amplitudes @ self.at_bands
         power[:, 0] = self._of_constant(power[:, 1:])
+        return power
+
+    def without_constants(self, amplitudes: Array) -> Array:
+        """Return S as `spectra`, so large in the first band that a constant has no weight."""
+        power: Array = amplitudes @ self.at_bands
+        power[:, 0] *= NO_WEIGHT
         return power
 
     def _of_constant(self, power: Array) -> Array:
