@@ -84,12 +84,16 @@ def _other_reading(recordings: Sequence[Recording]) -> str:
 def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
           reference: Reference | None) -> tuple[dict[str, Mistake], dict[str, StickSlip]]:
     """Return the drives whose recording has another reading, and those that stick and slip."""
+    # No law of a drive's motion describes what its controller and its elasticity do, so that a
+    # drive which sticks and slips looks like any reading.
+    sticking = {drive: slip for drive, slip in sticking_drives(recordings).items()
+                if slip.share_of_time > decisions.stick_slip}
+    if sticking:
+        return {}, sticking
     other = looks_like(model, recordings)
     if other and reference is not None:
         # What the reference looks like as well is no change.
         before = looks_like(model, reference.recordings)
         other = {drive: looks for drive, looks in other.items()
                  if drive not in before or before[drive].kind != looks.kind}
-    # No law of a drive's motion describes what its controller and its elasticity do.
-    return other, {} if other else {drive: slip for drive, slip in sticking_drives(
-        recordings).items() if slip.share_of_time > decisions.stick_slip}
+    return other, {}
