@@ -356,6 +356,9 @@ class Search:
         # Symmetric robots fit nearly as well in another order of their drives.
         if row.kind == 'drive_order':
             return fit.residual < table.BETTER_ORDER * self.start.residual
+        # Masses that inertia contradicts are guesses, and so is their weight.
+        if row.kind == table.WITHOUT_GRAVITY and fit.prior > table.PLAUSIBLE:
+            return False
         # What nothing explains, with any sign, may be external.
         evidence = self.evidence(fit.reading)
         return row.kind not in table.LACKING or fit.residual < table.GOOD_FIT or (
