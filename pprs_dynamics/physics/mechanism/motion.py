@@ -413,8 +413,10 @@ class PlatformMotion:
             carries times only without it.
         """
         knots, places, turns = checked_poses(time, position, orientation)
-        rows = spline_rows(knots, places, turns,
-                           knots if at is None else np.asarray(at, dtype=float))
+        moments = knots if at is None else np.asarray(at, dtype=float)
+        if not np.all(np.isfinite(moments)):
+            raise MotionError('at', 'a time is not finite', 'be finite', 'finite')
+        rows = spline_rows(knots, places, turns, moments)
         return cls.from_rows(rows, knots if at is None else None)
 
 
