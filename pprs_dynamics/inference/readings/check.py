@@ -92,7 +92,7 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
     if refuse and others:
         raise MisreadError(recording.name, [other.what for other in others],
                            lines_of(others, model.recorded.columns is not None))
-    return replace(recording, findings=(*mistakes, *recording.findings))
+    return replace(recording, findings=(*mistakes, *recording.findings), checked_for=model)
 
 
 def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = False,
@@ -143,7 +143,9 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
 def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, Mistake]:
     """Return what recordings look like instead of what the model file says, by drive."""
     return {drive: finding for recording in recordings
-            for finding in find_mistakes(model, recording) for drive in finding.drives}
+            for finding in (recording.findings if recording.checked_for is model
+                            else find_mistakes(model, recording))
+            if isinstance(finding, Mistake) for drive in finding.drives}
 
 
 class Search:

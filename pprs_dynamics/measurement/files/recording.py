@@ -51,6 +51,8 @@ class Recording(Samples):
         recorded, None where all were.
     are_poses : bool
         Whether each segment is a pose that is held.
+    checked_for : object, optional
+        The model for which its units, signs and order were checked: mistakes are in its findings.
     drives, time, position, velocity, effort, epoch, source, findings, units
     effort_limits, channels
         As of `Samples`.
@@ -65,6 +67,7 @@ class Recording(Samples):
     segments: tuple[slice, ...] = ()
     gain: Array | None = None
     are_poses: bool = False
+    checked_for: object = None
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1:
