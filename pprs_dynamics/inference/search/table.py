@@ -150,7 +150,7 @@ class ModelTable:
 
         Sets with a nonlinear effect are those of the last search, others those of the first.
         """
-        found = {key: self._with_forms(row) for key, row in self.exact.items()}
+        found = dict(self.exact)
         for fits in dict.fromkeys((self.last, self.first)):
             for fitted in sorted(fits.sets, key=lambda fitted: fitted.cost):
                 if fitted.is_admissible and (self.first is self.last
@@ -158,17 +158,6 @@ class ModelTable:
                     found.setdefault(fitted.row_key, Row(fits, fitted))
         by_cost = sorted(found.values(), key=lambda row: row.cost)
         return tuple({row.fitted.row_key: row for row in reversed(by_cost)}.values())[::-1]
-
-    def _with_forms(self, row: Row) -> Row:
-        """Return an exact row with what a form error explains of it, by linear forces."""
-        fitted, searches = row.fitted, (self.last, self.first)
-        fits = searches[0 if fitted.is_nonlinear else 1]
-        for other in searches:
-            if other.has(fitted.candidates) and (
-                    known := other.evaluate(fitted.candidates).with_form):
-                fits.evaluate(known.candidates)
-        forms = fits.evaluate(fitted.candidates).terms.forms
-        return replace(row, fitted=replace(fitted, terms=replace(fitted.terms, forms=forms)))
 
     @property
     def best(self) -> Row:
@@ -304,10 +293,30 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
     for fitted in _shortlist(fits):
         row = exact.get(fitted.row_key)
         if row is None or fitted.cost < row.cost - LEAST_CHANGE:
-            new = (Row.exact(fits, fitted) if fitted.is_nonlinear
-                   else Row.exact(first, first.evaluate(fitted.candidates)))
-            exact[fitted.row_key] = new if row is None else min(row, new, key=lambda row: row.cost)
+            exact = _with(exact, first, fits, fitted)
     return exact
+
+
+def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitted: CandidateSet,
+          ) -> dict[RowKey, Row]:
+    """Return exact rows with that of a set; of the same names the cheapest one.
+
+    And with those of the set with a form error, as which it costs no more. Where a set is
+    inadmissible by its exact forces, also with that of its best part, from where that is in it: by
+    itself an effect stands for others, too, and may end far from there.
+    """
+    found = dict(exact)
+    if fitted.with_form is not None:
+        found = _with(found, first, fits, fitted.with_form)
+    of_row = fits if fitted.is_nonlinear else first
+    row = Row.exact(of_row, of_row.evaluate(fitted.candidates))
+    around, whole = row.fits, row.fitted
+    parts = [other for other in around.sets if other.with_form is whole]
+    for new in (row, *(Row(around, part, row.linearisation) for part in parts)):
+        key = new.fitted.row_key
+        found[key] = min(found.get(key, new), new, key=lambda row: row.cost)
+    is_part = whole.barred and around.best.row_key < whole.row_key and around.best.candidates
+    return _with(found, first, around, replace(around.best, with_form=None)) if is_part else found
 
 
 def with_exact_best(table: ModelTable) -> ModelTable:
@@ -327,8 +336,7 @@ def with_exact_best(table: ModelTable) -> ModelTable:
                     and row.fitted.row_key not in table.exact), None)
         if row is None:
             break
-        table = replace(table, exact={**table.exact,
-                                      row.fitted.row_key: Row.exact(row.fits, row.fitted)})
+        table = replace(table, exact=_with(table.exact, table.first, row.fits, row.fitted))
     return table
 
 
