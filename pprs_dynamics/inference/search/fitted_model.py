@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.base_columns import (
     FrictionForm,
     force_of,
@@ -209,6 +210,23 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet, change: float =
         else:
             return None
     return OperatingPoint(target, base, effects)
+
+
+def is_shown(fits: FittedSets, fitted: CandidateSet) -> bool:
+    """Return whether a set has no nonlinear effect, or its exact forces are those of the columns.
+
+    They may differ by less than the margin of rivals.
+    """
+    if not fitted.is_nonlinear:
+        return True
+    if not has_nonlinear(fits, fitted):
+        return False
+    try:
+        exact = fits.design.exact_forces(fitted_model(fits, fitted))
+    except PprsError:
+        return True
+    return squared(fits, fitted, exact - linear_prediction(
+        fits, fitted)) < fits.decisions.rival_margin
 
 
 def has_nonlinear(fits: FittedSets, fitted: CandidateSet) -> bool:

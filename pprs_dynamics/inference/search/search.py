@@ -24,6 +24,7 @@ from pprs_dynamics.inference.search.candidates import (
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.components import placed
+from pprs_dynamics.inference.search.fitted_model import is_shown
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
@@ -61,23 +62,20 @@ class Search:
         """The set of lowest cost so far."""
         return self.fits.best
 
-    def run(self, start: Candidates = (), until_nonlinear: bool = False) -> CandidateSet:
+    def run(self, start: Candidates = ()) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone at first.
 
-        Patterns of no catalogue are added after effects. `until_nonlinear`: where
-        a nonlinear effect joins the search ends before its end, since what would come next might
-        only make good that columns do not show it.
+        Patterns of no catalogue are added after effects. Where the exact forces of the best set are
+        no longer those of the columns the search ends before its end: what would come next might
+        only make good the difference.
         """
         self.fits.stepped, self.is_ended = self._stepped, False
         try:
             self.fits.evaluate(())
             if start:
                 self.fits.refined(self.fits.evaluate(start))
-            self._descend(False, until_nonlinear)
-            if not until_nonlinear or not self.best.is_nonlinear:
-                if self.patterns:
-                    self._descend(True, False)
-                self.is_ended = True
+            self.is_ended = self._descend(False) and (
+                not self.patterns or self._descend(True))
             return self.best
         finally:
             # The fits hold hundreds of megabytes, and are let go of where nothing names them.
@@ -89,8 +87,8 @@ class Search:
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 
-    def _descend(self, with_patterns: bool, until_nonlinear: bool) -> None:
-        """Move from the best set to better neighbours until there is none."""
+    def _descend(self, with_patterns: bool) -> bool:
+        """Move from the best set to better neighbours; return whether until there is none."""
         while True:
             before = self.best.cost
             self._fit(self._additions(with_patterns))
@@ -105,9 +103,10 @@ class Search:
                 self._fit(reduced(fitted, component) for component in fitted.blocks)
             simplified(self.fits, self.best)
             self._fit(self._with_same_form())
-            if (not self.best.cost < before - LEAST_IMPROVEMENT
-                    or (until_nonlinear and self.best.is_nonlinear)):
-                return
+            if not self.best.cost < before - LEAST_IMPROVEMENT:
+                return True
+            if not is_shown(self.fits, self.best):
+                return False
 
     def _with_same_form(self) -> Iterator[Candidates]:
         """Yield sets with the form error that lowers the cost of the best set.

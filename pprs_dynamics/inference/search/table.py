@@ -19,6 +19,7 @@ from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
+    Candidates,
     CandidateSet,
     CostTerms,
     EffectCandidate,
@@ -42,6 +43,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_STEPS = 6  # of relinearisation of one row
+MOST_SEARCHES = 5  # each around the best model of the one before: three are rare
 MOST_EXACT = 4  # rows of one search that get exact costs
 
 
@@ -256,18 +258,23 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     design = design.beside(carry_over and carry_over(design))
     first = FittedSets(design, decisions)
-    search = Search(first, patterns_of(first), lambda share: report(0.25 + 0.35 * share))
-    search.run(until_nonlinear=True)
-    exact = _with_exact_costs(search, first, {})
-    best = min(exact.values(), key=lambda row: row.cost)
-    if not search.is_ended or best.fitted.is_nonlinear or abs(
-            first.evaluate(best.fitted.candidates).total - best.fitted.total) > LEAST_CHANGE:
-        point = best.fits.design.point
-        fits = first if point is None else first.around(point)
-        search = Search(fits, search.patterns if fits is first else patterns_of(fits),
-                        lambda share: report(0.6 + 0.3 * share))
-        search.run(best.fitted.candidates)
+    fits, patterns, exact = first, patterns_of(first), dict[RowKey, Row]()
+    start: Candidates = ()
+    left = 0.65  # of the work: each search has half of what is left
+
+    def searched(share: float) -> None:
+        report(0.9 - left * (1 - share / 2))
+
+    for number in range(MOST_SEARCHES):
+        search = Search(fits, patterns if fits is first else patterns_of(fits), searched)
+        search.run(start)
         exact = _with_exact_costs(search, first, exact)
+        best = min(exact.values(), key=lambda row: row.cost)
+        if search.is_ended and (number or (not best.fitted.is_nonlinear and abs(
+                first.evaluate(best.fitted.candidates).total - best.fitted.total) < LEAST_CHANGE)):
+            break
+        point, start = best.fits.design.point, best.fitted.candidates
+        fits, left = first if point is None else first.around(point), left / 2
     table = with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
     fit_courses(table.last, table.reported, list(table.alone.values()),
                 None if first is search.fits else first)
