@@ -342,12 +342,13 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], row: Row | None 
 @outside_cost('an effect that raises the error, on the recordings or held out, is not reported; '
               'with no other effect: `unknown`')
 def unconfirmed_effects(answer: Answer) -> tuple[FoundEffect, ...]:
-    """Return the effects of a row that data do not confirm: all where they cancel each other."""
+    """Return the effects of a row that data do not confirm; all where none lowers the error."""
     effects = answer.effects
-    if effects and answer.over_noise(answer.remaining) >= answer.over_noise(answer.given.error):
-        return tuple(replace(effect, objection=effect.objection or (
-            'with all reported effects the error does not fall')) for effect in effects)
-    return tuple(effect for effect in effects if effect.objection)
+    refuted = tuple(effect for effect in effects if effect.objection)
+    if refuted or answer.over_noise(answer.remaining) < answer.over_noise(answer.given.error):
+        return refuted
+    return tuple(replace(effect, objection='with all reported effects the error does not fall')
+                 for effect in effects)
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
