@@ -37,7 +37,13 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.search import Search, of_same_names, patterns_of
+from pprs_dynamics.inference.search.search import (
+    RECOVERED,
+    Search,
+    exchanged,
+    of_same_names,
+    patterns_of,
+)
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -329,22 +335,40 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
 def with_exact_best(table: ModelTable) -> ModelTable:
     """Return a table in which the rows that may be the best have exact costs.
 
-    Those within the margin of rivals, and the best row without one of its effects: around the
-    model of a nonlinear set the linear cost of a smaller one says little.
+    Those within the margin of rivals, the best row without one of its effects, and the one with
+    another nonlinear effect in the place of one: around the model of a nonlinear set the linear
+    costs of these say little.
     """
     margin, table = table.last.decisions.rival_margin, replace(table)
     for _ in range(MOST_EXACT):
         best = table.best
         near = [row for row in table.rows if row.cost < best.cost + margin]
-        if best.fitted.is_nonlinear and not best.fitted.is_dated and len(best.effects) > 1:
-            near += [Row(best.fits, best.fits.evaluate(best.fitted.without(effect)))
-                     for effect in best.effects]
+        if best.fitted.is_nonlinear and not best.fitted.is_dated:
+            near += _exchanged(table)
+            if len(best.effects) > 1:
+                near += [Row(best.fits, best.fits.evaluate(best.fitted.without(effect)))
+                         for effect in best.effects]
         row = next((row for row in near if not row.is_exact
                     and row.fitted.row_key not in table.exact), None)
         if row is None:
             break
         table = replace(table, exact=_with(table.exact, table.first, row.fits, row.fitted))
     return table
+
+
+def _exchanged(table: ModelTable) -> list[Row]:
+    """Return the best row with another nonlinear effect in the place of one.
+
+    Of those that by themselves explain nearly as much.
+    """
+    fitted, fits = table.best.fitted, table.last
+    known = {c.placed_name for c in fitted.effects}
+    alone = {name: other for name, other in table.alone.items() if other.is_nonlinear}
+    none = table.first.evaluate(()).cost
+    return [Row(fits, fits.evaluate(exchanged(fitted, effect, other.candidates[0])))
+            for effect in fitted.effects if effect.name in alone
+            for name, other in alone.items() if name not in known
+            and none - other.cost > RECOVERED * (none - alone[effect.name].cost)]
 
 
 def _shortlist(fits: FittedSets) -> Iterable[CandidateSet]:
