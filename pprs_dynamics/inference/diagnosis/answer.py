@@ -205,7 +205,8 @@ class Answer:
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return estimates of an effect by sets that cost nearly as little, and what they cost."""
-        near = self.table.near(self.decisions.rival_margin)[:MOST_AVERAGED]
+        near = self.table.near(self.decisions.rival_margin)[:MOST_AVERAGED] if (
+            self.row is self.table.best) else []
         return [(cost, estimate(self.table.last, fitted, same)) for cost, fitted in near
                 for same in fitted.effects
                 if same.effect is candidate.effect and same.course == candidate.course]
@@ -336,7 +337,9 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], row: Row | None 
         return answer.diagnosis(unconfirmed)
     names, fits = {effect.name for effect in refuted}, table.best.fits
     rest = fits.evaluate(tuple(c for c in answer.fitted.candidates if c.name not in names))
-    return answer_of(table, validate, Row(fits, rest, 0.0), (*unconfirmed, *refuted))
+    known = table.exact.get(rest.row_key)
+    less = known or (Row(fits, rest, 0.0) if rest.is_dated else Row.exact(fits, rest))
+    return answer_of(table, validate, less, (*unconfirmed, *refuted))
 
 
 @outside_cost('an effect that raises the error, on the recordings or held out, is not reported; '
