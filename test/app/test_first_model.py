@@ -340,7 +340,7 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     assert 'pprs fit run.csv --model robot.yaml --output base.yaml' in said
     assert checked((tmp_path / 'x.json').read_text(), 'init')['drives'] == list(JOINTS)
     before = (tmp_path / 'robot.yaml').read_text()
-    assert 'guessed: no header: columns 2 to 4 taken as positions' in before
+    assert 'guessed: no header: positions are columns 2, 3, 4; ' in before
     assert main(['info', 'run.csv', '--model', 'robot.yaml']) == 0
     capsys.readouterr()
     (tmp_path / 'robot.yaml').unlink()

@@ -8,14 +8,14 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from pprs_dynamics.drives import CHANNELS, RecordedDrives
+from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.columns import (
@@ -31,7 +31,6 @@ from pprs_dynamics.inference.readings.table import (
     CURRENT,
     EFFORT,
     POSITION,
-    VELOCITY,
     WORDS,
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
@@ -56,8 +55,6 @@ from pprs_dynamics.system.plain_yaml import as_yaml
 
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
-SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
-              CURRENT: 'effort_scale'}
 
 
 # Mistakes of which a model file may have the line without a question.
@@ -496,28 +493,18 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
                 raise
         guess = guess_columns(contents.series, drives, others=movable, rate=rate, model=model)
         kinds = {*(kind for _, kind in guess.columns), guess.effort_kind}
-    if guess.time is not None:
-        if guess.time not in TIME_COLUMNS:
-            found['time'] = guess.time
-    elif not all(str(series.column).startswith('/') for series in contents.series):  # not of a bag
-        if guess.rate is None:
-            raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
-                                  'samples per second')
-        found['rate'] = guess.rate
-    if guess.time_fraction is not None:
-        found['time_fraction'] = guess.time_fraction
-    if guess.time_scale is not None:
-        found['time_scale'] = guess.time_scale
+    for drive in ('', *drives):
+        cells = {key: value for (of, key), value in guess.columns.items() if of == drive}
+        found |= cells if not drive else {drive: cells} if cells else {}
+    if found.get('time') in TIME_COLUMNS:
+        del found['time']
+    elif all(str(series.column).startswith('/') for series in contents.series):  # of a bag
+        found.pop('rate', None)
+    elif 'time' not in found and 'rate' not in found:
+        raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
+                              'samples per second')
     if contents.decimal != '.':
         found['decimal'] = contents.decimal
-    for drive in drives:
-        cells: dict[str, Any] = {
-            kind: guess.columns[drive, kind] for kind in (*SETTLED, *CHANNELS)
-            if (drive, kind) in guess.columns}
-        cells |= {SCALE_KEYS[kind]: guess.scales[drive, kind] for kind in SETTLED
-                  if (drive, kind) in guess.scales}
-        if cells:
-            found[drive] = cells
     return found, guess.notes, kinds
 
 
@@ -527,16 +514,13 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
     inside = {kind: look_into(file) for kind, file in files.items()}
     guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
                for kind, file in inside.items() if kind != FILE_TIME}
-    merged = replace(
-        guesses[POSITION], rate=rate,
-        columns={key: name for guess in guesses.values() for key, name in guess.columns.items()},
-        scales={key: scale for guess in guesses.values() for key, scale in guess.scales.items()},
-        notes=[f'{files[kind].name}: {note}' for kind, guess in guesses.items()
-               for note in guess.notes])
+    columns = {key: value for kind, guess in guesses.items()
+               for key, value in guess.columns.items() if key[0] or kind == POSITION}
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
-        return replace(merged, time=series[0].column if series else 1)
-    return merged
+        columns['', 'time'] = series[0].column if series else 1
+    return Guess(columns, [f'{files[kind].name}: {note}' for kind, guess in guesses.items()
+                           for note in guess.notes])
 
 
 def _pattern(files: Mapping[str, Path]) -> dict[str, str]:

@@ -28,7 +28,6 @@ from pprs_dynamics.inference.readings.evidence import (
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
     OtherReading,
-    factors_of,
     find_motion,
     find_no_measurements,
     find_other_velocities,
@@ -39,6 +38,7 @@ from pprs_dynamics.inference.readings.findings import (
     lines_of,
     near,
 )
+from pprs_dynamics.inference.readings.links import velocity_links
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -65,8 +65,6 @@ class Fit:
         Largest and weighted mean prior cost of a drive [nats].
     least_residual : float
         Smallest residual of a drive.
-    is_rigid : bool
-        Whether each effort certainly has inertia or weight in it.
     """
 
     reading: Reading
@@ -76,7 +74,6 @@ class Fit:
     prior: float = 0.0
     least_residual: float = 1.0
     mean_prior: float = 0.0
-    is_rigid: bool = False
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -171,8 +168,11 @@ class Search:
             other := excerpt_of(recording, table.STRETCHES, unit)) is not None}}
         columns = model.recorded.columns
         self.rate = columns.rate if rate is None and columns is not None else rate
-        # Recorded velocities over the derivatives of positions.
-        self.factors = factors_of(excerpt.velocity, excerpt.motion.velocity)
+        # Recorded velocities over the derivatives of positions, each with its relative doubt.
+        self.factors = {d: (factor, table.RATE_OFF + 1 - alike ** 2) for d, (alike, factor) in (
+            enumerate(() if recording.velocity is None else velocity_links(
+                zip(recording.position.T, recording.velocity.T, strict=True), recording.time)))
+            if abs(alike) >= table.ALIKE}
         self.velocity_scales = [model.recorded.columns_of(drive).velocity_scale
                                 for drive in model.drives]
         turning = [units.turns for units in model.units]
@@ -312,22 +312,23 @@ class Search:
 
         Without times the velocities may be in any unit.
         """
+        if not self.factors and self.model.recorded.columns is not None and self.rate:
+            for unit in table.RATES:
+                yield replace(self.rows[0], kind='rate', cost=table.COST['rate'], time_unit=unit,
+                              what=f'there look to be {self.rate / unit:g} samples per second, '
+                              f'not {self.rate:g}')
         factors = [factor * before.time_unit / float(before.scale[d])
                    for d, (factor, _) in self.factors.items()]
         common = float(np.median(factors or [0.0]))
-        if common <= 0 or not all(near(common, (factor,)) for factor in factors):
+        if common <= 0 or not all(near(common, (factor,)) for factor in factors) or (
+                self.rate is None and not self._against_velocities(before)):
             return
         # Velocities may be in the unit of the positions, as they are read, or in one of their own.
         scale = float(np.median([self.velocity_scales[d] for d in self.factors]))
-        units = {unit * scale: table.COST['velocity_unit'] * (unit != 1) for unit in (
-            1.0, *table.VELOCITY_UNITS) if unit > 0} | {1.0: 0.0}
-        if self.rate is None:
-            # Recorded times are right where positions in degrees or turns explain the factor.
-            known = [angle * unit for angle in (1.0, *table.ANGLES) for unit in units]
-            units = {1.0: 0.0} if not near(common, known) or near(common, (
-                *table.TIMES, *(1 / unit for unit in table.TIMES))) else {}
+        units = {1.0: 0.0} if self.rate is None else {unit * scale: table.COST['velocity_unit'] * (
+            unit != 1) for unit in (1.0, *table.VELOCITY_UNITS) if unit > 0} | {1.0: 0.0}
         for unit, cost in units.items():
-            if not near(common, (unit,)):
+            if not near(unit / common, self._excerpts):
                 what = 'the times were in another unit' if self.rate is None else (
                     f'there were {float(f"{self.rate * common / unit:.3g}"):g} samples per second, '
                     f'not {self.rate:g}')

@@ -122,7 +122,7 @@ class Evidence:
 
     def is_measured(self, drive: int, column: int) -> bool:
         """Whether there are enough efforts for a regression."""
-        return bool(self.count[drive, column] > EFFORT and self.total[drive, column] > 0)
+        return bool(round(self.count[drive, column]) >= EFFORT and self.total[drive, column] > 0)
 
     def likelihood(self, drive: int, column: int, scale: float, masses: float,
                    contains: tuple[int, ...] = (1, 1, 1, 1, 1)) -> Likelihood:

@@ -201,38 +201,20 @@ def near(factor: float, units: Iterable[float], doubt: float = table.RATE_OFF) -
     return next((unit for unit in units if abs(factor / unit - 1) <= doubt), 0.0)
 
 
-def factors_of(recorded: Array | None, true: Array, least: float = table.ALIKE,
-               ) -> dict[int, tuple[float, float]]:
-    """Return recorded columns over those of a motion, of drives where they agree.
-
-    Each with its relative doubt: noise of the derivatives makes a factor smaller.
-    """
-    found = {}
-    for drive, columns in enumerate(() if recorded is None else zip(
-            recorded.T, true.T, strict=True)):
-        pair = np.column_stack(columns)[np.isfinite(columns[0])]
-        (size, both), (_, other) = pair.T @ pair
-        alike = float(both / np.sqrt(max(size * other, 1e-300)))
-        if abs(alike) >= least:
-            found[drive] = float(both / other), table.RATE_OFF + 1 - alike ** 2
-    return found
-
-
 def find_motion(model: DriveModel, excerpt: Excerpt) -> Iterator[OtherReading]:
     """Yield efforts that are the recorded motion itself."""
-    motion, effort = ('position', 'velocity', 'acceleration'), excerpt.effort
-    swing = effort - np.nanmean(np.where(np.isfinite(effort).any(axis=0), effort, 0.0), axis=0)
-    for quantity in motion if model.effort_kind not in KINDS else ():
+    effort = excerpt.effort
+    group = np.flatnonzero(np.any(np.nan_to_num(effort), axis=0)).tolist()
+    for quantity in ('position', 'velocity', 'acceleration') if group else ():
         true = getattr(excerpt.motion, quantity)
-        found = factors_of(swing, true - true.mean(axis=0), table.COPY)
-        group = [d for d, (factor, doubt) in found.items() if near(factor, (1.0,), doubt)]
-        if group and len(group) == np.sum(np.any(np.nan_to_num(swing), axis=0)):
+        apart, size = (np.linalg.norm(np.nan_to_num(values)[:, group], axis=0)
+                       for values in (effort - true, true))
+        if np.all(apart < table.SAME_MOTION * size) and model.effort_kind not in KINDS:
             yield OtherReading.of(
                 'effort_motion', model.drives, group,
-                f'the effort of {named(model.drives, tuple(group))} is '
-                f'{found[group[0]][0]:.3g} times the {quantity}, and must be a force or torque: '
-                'name its column under columns. Or no effort was measured',
-                f'{EFFORT_KIND}: {recorded_names.COMMANDED}')
+                f'the effort of {named(model.drives, tuple(group))} is 1 times the {quantity}, and '
+                'must be a force or torque: name its column under columns. Or no effort was '
+                'measured', f'{EFFORT_KIND}: {recorded_names.COMMANDED}')
 
 
 def _time_scale(model: DriveModel, unit: float) -> Scale:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,47 +16,41 @@ from pprs_dynamics.inference.readings import table
 from pprs_dynamics.measurement.files.recording import MOST_OF_TURN, TURN_ROUNDING, unwrapped
 
 
-@dataclass(frozen=True)
-class Links:
-    """Which columns are derivatives of which, from M columns of N samples.
+def links_of(values: Array, time: Array) -> tuple[Array, Array]:
+    """Return which of M columns, (N, M), are derivatives of which, (M, M) each.
 
-    Parameters
-    ----------
-    correlation, slope : (M, M) arrays
-        Of column j with the derivative of column i, over steps of several lengths; NaN where one
-        of them does not move.
+    Correlation, and ratio, of column j with the derivative of column i; NaN where one of them does
+    not move. Changes of every column are compared with the integral of every other one, over
+    steps of several lengths: integrals forgive quantisation and noise, which differences multiply.
     """
+    known = np.isfinite(values).all(axis=1) & np.isfinite(time)
+    known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
+    values, steps = values[known], np.diff(time[known])[:, None]
+    area = np.cumsum(np.vstack([0 * values[:1], 0.5 * (values[1:] + values[:-1]) * steps]), axis=0)
+    correlation, slope = np.full((2, values.shape[1], values.shape[1]), np.nan)
+    for length in (step for step in table.LENGTHS_OF_STEPS if (
+            step < len(values) // 4 and len(values) >= table.LEAST_ROWS)):
+        change, covered = (part[length:] - part[:-length] for part in (values, area))
+        change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
+        sizes, areas = (np.sum(part ** 2, axis=0) for part in (change, covered))
+        product = np.where(both := np.outer(sizes, areas), change.T @ covered, np.nan)
+        alike = product / np.sqrt(np.where(both, both, 1.0))
+        better = ~(np.abs(alike) <= np.abs(correlation)) & np.isfinite(alike)
+        with np.errstate(divide='ignore'):
+            slope = np.where(better, areas / product, slope)
+        correlation = np.where(better, alike, correlation)
+    return correlation, slope
 
-    correlation: Array
-    slope: Array
 
-    @classmethod
-    def of(cls, values: Array, time: Array) -> Links:
-        """Compare changes of every column, (N, M), with the integral of every other one.
+def velocity_links(drives: Iterable[Sequence[Array]], time: Array) -> list[tuple[float, float]]:
+    """Return the correlation of velocities with derivatives of positions, and their ratio.
 
-        Integrals forgive quantisation and noise, which differences multiply.
-        """
-        known = np.isfinite(values).all(axis=1) & np.isfinite(time)
-        known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
-        values, time = running_on(values[known]), time[known]
-        unknown = np.full(2 * (values.shape[1],), np.nan)
-        steps = np.diff(time)[:, None]
-        area = np.cumsum(np.vstack([0 * values[:1], 0.5 * (values[1:] + values[:-1]) * steps]),
-                         axis=0)
-        found = cls(unknown, unknown)
-        for length in (step for step in table.LENGTHS_OF_STEPS if (
-                step < len(time) // 4 and len(time) >= table.LEAST_ROWS)):
-            change, covered = (part[length:] - part[:-length] for part in (values, area))
-            change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
-            sizes, areas = (np.sum(part ** 2, axis=0) for part in (change, covered))
-            product = np.where(both := np.outer(sizes, areas), change.T @ covered, np.nan)
-            correlation = product / np.sqrt(np.where(both, both, 1.0))
-            better = ~(np.abs(correlation) <= np.abs(found.correlation)) & np.isfinite(correlation)
-            with np.errstate(divide='ignore'):
-                slope = areas / product
-            found = cls(np.where(better, correlation, found.correlation),
-                        np.where(better, slope, found.slope))
-        return found
+    Of each drive, from its positions and velocities, (N,) each, in the middle of a recording. Both
+    are NaN where a drive does not move or is not known.
+    """
+    middle = slice(max(len(time) // 2 - table.HALF, 0), len(time) // 2 + table.HALF)
+    found = [links_of(np.column_stack(pair)[middle], time[middle]) for pair in drives]
+    return [(float(correlation[0, 1]), float(slope[0, 1])) for correlation, slope in found]
 
 
 def turn_of(values: Array) -> float:
@@ -97,31 +91,32 @@ def layouts(values: Array, time: Array, count: int) -> list[Layout]:
 
     Those with the most evidence come first, of equal ones those with the smoothest positions.
     """
-    links, width = Links.of(values, time), values.shape[1]
+    links, width = links_of(values, time), values.shape[1]
     number = width // count
     found: dict[str, Layout] = {}
     for first in range(width - number * count + 1) if number else ():
         places = np.arange(first, first + number * count)
         for blocks in (places.reshape(number, count), places.reshape(count, number).T):
-            for layout in _layouts_of(links, values, blocks.tolist()):
+            for layout in _layouts_of(*links, values, blocks.tolist()):
                 found.setdefault(str(layout.blocks), layout)
     return sorted(found.values(), key=lambda layout: (
         -layout.evidence, roughness(values[:, layout.blocks[table.POSITION]])))
 
 
-def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterator[Layout]:
+def _layouts_of(correlation: Array, slope: Array, values: Array, blocks: list[list[int]],
+                ) -> Iterator[Layout]:
     """Yield which block may be the positions, and which other one, or none, the efforts."""
     numbers, moves = range(len(blocks)), np.any(np.diff(values, axis=0), axis=0)
     moving = [in_motion(values, block) for block in blocks]
     # A block that is the derivative of another, or the same earlier or later.
-    rates = np.array([[_nats(links.correlation[i, j][first & second]) for j, second in zip(
+    rates = np.array([[_nats(correlation[i, j][first & second]) for j, second in zip(
         blocks, moving, strict=True)] for i, first in zip(blocks, moving, strict=True)])
-    alike = np.array([[move_alike(values, i, j) for j in blocks] for i in blocks])
+    alike = np.array([[lag_of(values, i, j) is not None for j in blocks] for i in blocks])
     follows = np.where(alike, len(blocks[0]) * _nats(np.array([table.COPY])), rates)
 
     def best_of(block: int, known: Sequence[int]) -> int:
         """Return the measured one of those that move as a block does."""
-        group = [block, *(k for k in known if alike[block, k] and k != block)]
+        group = sorted({block, *(k for k in known if alike[block, k])})
         return group[measured(values, [blocks[k] for k in group])]
 
     for q in numbers:
@@ -144,7 +139,7 @@ def _layouts_of(links: Links, values: Array, blocks: list[list[int]]) -> Iterato
             explained = [*blocks[q], *(blocks[effort] if effort is not None else ()), *(
                 place for k in known for place in np.asarray(blocks[k])[moving[k] & moving[q]])]
             evidence -= table.MASSES_MOST * float(np.sum(np.delete(moves, explained)))
-            slopes = links.slope[found[table.POSITION], found.get(table.VELOCITY, blocks[q])][
+            slopes = slope[found[table.POSITION], found.get(table.VELOCITY, blocks[q])][
                 moving[q]]
             yield Layout(found, float(np.nanmedian(slopes)) if table.VELOCITY in found else 0.0,
                          evidence)
@@ -165,20 +160,22 @@ def in_motion(values: Array, block: Sequence[int]) -> NDArray[np.bool_]:
     return np.asarray(spans > table.WEAK * spans.max())
 
 
-def move_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
-    """Return whether some columns move as others do, perhaps earlier or later."""
+def lag_of(values: Array, block: Sequence[int], other: Sequence[int]) -> float | None:
+    """Return by how many samples another block comes later; None if they do not move alike."""
     first, second = in_motion(values, block), in_motion(values, other)
     if not np.any(first & second):
-        return not np.any(first | second)
-    return all(lag(values[:, block[k]], values[:, other[k]]) is not None
-               for k in np.flatnonzero(first & second).tolist())
+        return None if np.any(first | second) else 0.0
+    lags = [lag(values[:, block[k]], values[:, other[k]])
+            for k in np.flatnonzero(first & second).tolist()]
+    known = [found for found in lags if found is not None]
+    return float(np.median(known)) if len(known) == len(lags) else None
 
 
 def lag(values: Array, other: Array) -> int | None:
     """Return by how many samples other values come later; None where they do not move alike."""
-    values, other = np.nan_to_num(values), np.nan_to_num(other)
-    step = max(_step(values), _step(other))
-    first, second = (part[step:] - part[:-step] for part in (values, other))
+    # Over many samples an encoder's counts do not matter.
+    step = max(1, len(values) // table.LEAST_ROWS)
+    first, second = (np.nan_to_num(part[step:] - part[:-step]) for part in (values, other))
     count = len(first) - table.LONGEST_LAG
     if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
         return None
@@ -189,33 +186,22 @@ def lag(values: Array, other: Array) -> int | None:
     return best if found[best] > table.COPY else None
 
 
-def _step(values: Array) -> int:
-    """Return the samples in which a column changes by many of the counts that it has."""
-    moved = np.abs(np.diff(values))
-    count = np.min(moved, where=moved > 0, initial=np.inf)
-    return next((step for step in table.LENGTHS_OF_STEPS[:4] if np.std(
-        values[step:] - values[:-step]) > table.COARSE * count), 1)
-
-
 def measured(values: Array, blocks: Sequence[Sequence[int]]) -> int:
     """Return the place of the block that is measured, of those that move as the first one does.
 
     That is the last one, or the one with noise: commands have none.
     """
-    moving = in_motion(values, blocks[0])
-    if np.any(moving):
-        blocks = [[place for place, moves in zip(block, moving, strict=True) if moves]
-                  for block in blocks]
-    lags = [[lag(values[:, first], values[:, other]) for first, other in zip(
-        blocks[0], block, strict=True)] for block in blocks]
-    alike = [k for k, found in enumerate(lags) if k == 0 or None not in found]
+    lags = [lag_of(values, blocks[0], block) for block in blocks]
     rough = [roughness(values[:, block]) for block in blocks]
+    alike = [k for k, found in enumerate(lags) if k == 0 or found is not None]
     least = table.ROUGHER * min(rough[k] for k in alike)
-    return max(alike, key=lambda k: (float(np.median([lag or 0 for lag in lags[k]])),
-                                     rough[k] > least))
+    return max(alike, key=lambda k: (lags[k] or 0.0, rough[k] > least))
 
 
 def roughness(values: Array) -> float:
-    """Return the size of third differences over that of the first ones: small for a motion."""
-    moved = np.std(np.diff(values, axis=0), axis=0)
-    return float(np.median(np.std(np.diff(values, 3, axis=0), axis=0) / np.maximum(moved, 1e-300)))
+    """Return the third differences of columns over their first ones: small for a motion.
+
+    The median does not see single jumps.
+    """
+    moved = np.maximum(np.std(np.diff(values, axis=0), axis=0), 1e-300)
+    return float(np.median(np.abs(np.diff(values, 3, axis=0)) / moved))

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence, Sized
 
 from pprs_dynamics.drives import Column, DriveColumns
 from pprs_dynamics.inference.readings import table
@@ -76,58 +76,54 @@ def _split(word: str) -> list[str]:
     return [part for part in compound.groups() if part] if compound else [word]
 
 
-def fit_of_name(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
+def kinds_of(words: Collection[str]) -> set[str]:
+    """Return the quantities that the words of a name may name; empty where they name none."""
+    words = {*words}
+    if words & table.OTHERS:
+        return {table.NEITHER}
+    kinds = {kind for kind in table.UNITS if f'<{kind}>' in words} - {table.SHARE}
+    # A single letter next to a word is a prefix of programmers.
+    for known in ({word for word in words if len(word) > 1}, words):
+        kinds = kinds or {kind for kind, named in table.WORDS.items() if known & {*named}}
+    is_german = bool(words & {'ist', 'soll'})
+    if not kinds and is_german and 'm' in words:
+        return {EFFORT}
+    if not kinds and (words & table.OF_JOINTS or (is_german and 'a' in words)):
+        return {POSITION}  # "joint torque" is no position
+    return kinds - {EFFORT} if CURRENT in kinds else kinds
+
+
+def fit_of_name(key: tuple[str, ...], members: Sized, quantity: str, given: str | None,
                 ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
-    kinds = {kind for kind in (*table.WORDS, table.TIME, table.NEITHER) if f'<{kind}>' in key}
-    # A single letter next to a word is a prefix of programmers.
-    kinds = kinds or _kinds_of({word for word in key if len(word) > 1}) or _kinds_of({*key})
-    is_german = bool({*key} & {'ist', 'soll'})
-    if not kinds and is_german and 'm' in key:
-        kinds.add(EFFORT)
-    if not kinds and ({*key} & table.OF_JOINTS or (is_german and 'a' in key)):
-        kinds.add(POSITION)  # "joint torque" is no position
-    if CURRENT in kinds and EFFORT in kinds:
-        kinds.discard(EFFORT)
+    kinds = kinds_of(key)
     # The name of the joint alone is a position, as in `shoulder_pan`.
     plain = not kinds and not {*key} - {'*', 'observation'} - table.MEASURED
-    fits = given is not None or quantity in kinds or (quantity == POSITION and plain)
-    if quantity == POSITION and VELOCITY in kinds:
-        fits = False
-    if not fits or {*key} & table.OTHERS:
+    fits = quantity in kinds or (given is not None and table.NEITHER not in kinds) or (
+        quantity == POSITION and plain)
+    if not fits or (quantity == POSITION and VELOCITY in kinds):
         return (-1.0,)
     return (float(len(members)), float(not {*key} & (table.COMMANDS | table.FROM_OUTSIDE)),
             float(not {*key} & table.SECONDARY), float(bool({*key} & table.MEASURED)),
             -float(len(key)))
 
 
-def _kinds_of(words: set[str]) -> set[str]:
-    """Return the quantities that some words name."""
-    return {kind for kind, known in table.WORDS.items() if words & {*known, f'<{kind}>'}}
-
-
 def may_be(title: str, quantity: str) -> bool:
     """Return whether the words of a name say no other quantity."""
-    words = {*words_of(title)}
-    kinds = _kinds_of(words)
-    return not words & table.OTHERS and (not kinds or quantity in kinds or (
-        quantity == EFFORT and CURRENT in kinds))
+    kinds = kinds_of(words_of(title))
+    return not kinds or quantity in kinds or (quantity == EFFORT and CURRENT in kinds)
 
 
 def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
     """Return the joint whose name is among the words, where, and how long it is."""
-    best: tuple[str, int, int] | None = None
+    found = []
     for joint in joints:
         own = words_of(joint)
-        shorter = [word for word in own if word != 'joint'] or own
-        for name in (own, shorter):
-            if name == ['joint'] or all(word.isdigit() for word in name):
-                continue
-            for at in range(len(words) - len(name) + 1):
-                if list(words[at:at + len(name)]) == name and (
-                        best is None or len(name) > best[2]):
-                    best = (joint, at, len(name))
-    return best
+        shorter = [word for word in own if word != 'joint']
+        found += [(joint, at, len(name)) for name in (own, shorter)
+                  if name != ['joint'] and not all(word.isdigit() for word in name)
+                  for at in range(len(words)) if [*words[at:at + len(name)]] == name]
+    return max(found, key=lambda place: place[2], default=None)
 
 
 def numbered(series: Sequence[Series]) -> dict[tuple[str, ...], dict[int, Column]]:

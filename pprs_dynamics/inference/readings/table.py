@@ -33,6 +33,7 @@ COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
           for bits in (12, 10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
 POSITION_UNITS = frozenset((*LENGTHS, *ANGLES, *COUNTS))
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
+RATES = (0.1, 0.2, 0.5, 2.0, 5.0, 10.0)  # given over true ones
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
@@ -133,17 +134,16 @@ WORDS = {
              'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'strom'),
+    'temperature': ('temperature', 'temperatures', 'temp', 'temps'),
+    'pressure': ('pressure', 'pressures'),
 }
 # Words of a position, where no word names a quantity.
 OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
-# Words of channels that are measured in addition.
-CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
-                 'pressure': {'pressure', 'pressures'}}
 PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
 # Titles with one of these name neither a joint's measured motion nor its effort.
 OTHERS = frozenset((
-    'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'temp', 'temperature',
-    'temperatures', 'voltage', 'power', 'tcp', 'cartesian', 'pose', 'ee', 'twist', 'wrench',
+    'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'voltage',
+     'power', 'tcp', 'cartesian', 'pose', 'ee', 'twist', 'wrench',
     'gravity', 'limit', 'error', 'err', 'action', 'reward', 'index', 'episode', 'frame', 'done',
     'tracking'))
 # Words of commands, which are read only where nothing is measured.
@@ -181,21 +181,21 @@ UNITS = {
            **dict.fromkeys(('ms', 'msec', 'millis', 'milliseconds'), 1e-3),
            **dict.fromkeys(('us', 'µs', 'usec', 'micros', 'microseconds'), 1e-6),
            **dict.fromkeys(('ns', 'nsec', 'nanosec', 'nanoseconds'), 1e-9)},
-    NEITHER: dict.fromkeys(('v', 'w', '°c', 'c', 'degc', 'k', 'bar', 'hz', 'j', 'm/s2', 'rad/s2',
-                            'deg/s2', 'mm/s2', '°/s2'), 1.0)}
+    'temperature': dict.fromkeys(('°c', 'c', 'degc', 'k'), 1.0), 'pressure': {'bar': 1.0},
+    NEITHER: dict.fromkeys(('v', 'w', 'hz', 'j', 'm/s2', 'rad/s2', 'deg/s2', 'mm/s2', '°/s2'),
+                           1.0)}
 
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
+SAME_MOTION = 0.1  # distance of efforts from the motion that they are, over its size
 ROUGHER = 1.5  # third differences of what has noise, over those of what has none
-UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 NEARLY = 0.95  # of a turn that columns cover whose angles begin again each turn
 NO_EFFORT = 0.25  # residual of a column that is no effort, next to one with less
-LEAST_ROWS = 30
-COARSE = 8.0  # counts of an encoder by which a column changes, so that rounding does not matter
+LEAST_ROWS, HALF = 30, 10_000  # samples that are compared, and on each side of the middle at most
 LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
-SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
+SHORTEST = 1e-5  # [s]; step of a robot's recording
 
 # --------------------------------------------------------------------------------- velocities
 

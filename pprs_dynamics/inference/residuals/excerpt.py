@@ -31,14 +31,11 @@ class Excerpt:
         [s]
     effort : (N, D) array
         [N]; NaN where it was not measured.
-    velocity : (N, D) array or None
-        As recorded [m/s].
     """
 
     motion: DriveMotion
     time: Array
     effort: Array
-    velocity: Array | None
 
     def slower(self, unit: float) -> Excerpt:
         """Return the same samples with a unit of time so many times as long."""
@@ -89,7 +86,5 @@ def excerpt_of(recording: Recording, stretches: int, time_unit: float = 1.0,
         smooth, position=means(smooth.position), velocity=means(smooth.velocity),
         acceleration=means(smooth.acceleration), index=smooth.index[treat.starts[kept]],
         segments=tuple(segments))
-    velocity = None if recording.velocity is None else means(recording.velocity[smooth.index])
     return Excerpt(motion, means(scaled.time[smooth.index, None])[:, 0],
-                   means(recording.effort[smooth.index]),
-                   velocity)
+                   means(recording.effort[smooth.index]))

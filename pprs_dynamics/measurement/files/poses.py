@@ -21,8 +21,7 @@ FARTHER = 10.0
 FEW = 34  # samples that show no motion: two of the shortest windows that derivatives are of
 
 
-def held_poses(position: Array, time: Array | None = None, velocity: Array | None = None,
-               ) -> NDArray[np.int64]:
+def held_poses(position: Array, time: Array, velocity: Array | None) -> NDArray[np.int64]:
     """Return the first sample of each pose, where poses are held throughout; none of a motion.
 
     A pose is one sample, as in a table that is written by hand, or several. The way from one pose
@@ -32,9 +31,9 @@ def held_poses(position: Array, time: Array | None = None, velocity: Array | Non
     ----------
     position : (N, D) array
         [rad, m]
-    time : (N,) array, optional
-        [s]; without it, each sample that differs is taken to last long.
-    velocity : (N, D) array, optional
+    time : (N,) array
+        [s]
+    velocity : (N, D) array or None
         As recorded [rad/s, m/s].
     """
     motion = np.zeros(0, dtype=np.int64)
@@ -52,11 +51,11 @@ def held_poses(position: Array, time: Array | None = None, velocity: Array | Non
     poses = position[firsts][:, span > LEAST_RANGE]
     steps, third = (np.diff(poses, order, axis=0) for order in (1, 3))
     is_rough = np.any(np.std(third, axis=0) > NO_MOTION * np.std(steps, axis=0))
-    lasting = np.inf if time is None else float(np.median(np.diff(time[firsts])))
-    if velocity is not None and np.isfinite(velocity).any() and time is not None and np.median(
+    lasting = float(np.median(np.diff(time[firsts])))
+    if velocity is not None and np.isfinite(velocity).any() and np.median(
             np.abs(steps)) < FARTHER * lasting * np.nanmedian(np.abs(velocity)):
         return motion
     is_rough |= is_single and len(position) <= FEW
-    is_held = (is_rough and (lasting >= LONG_POSE or not is_single)) or (
-        not is_single and LONG_POSE <= lasting < np.inf)
+    # Two of three signs: no smooth motion, several samples each, a long time each.
+    is_held = sum((bool(is_rough), not is_single, lasting >= LONG_POSE)) >= 2
     return firsts if is_held and np.all(drift < 2 * still) else motion
