@@ -122,8 +122,10 @@ def drawn(folder: Path, seed: int) -> Drawn:
     if not has_names:
         path.write_text(path.read_text().lstrip('\n'))
     (folder / 'robot.urdf').write_text(ARM if is_arm else SLIDE)
-    # Only recorded velocities can tell that a rate is wrong.
-    is_wrong = bool(wrong and not has_time and has_velocity)
-    rate = None if has_time else RATE * (random.choice([0.5, 1.25, 5.0]) if is_wrong else 1.0)
+    # Without velocities inertia beside a known weight shows a rate that is far too high.
+    times = random.choice([0.5, 1.25, 5.0])
+    is_shown = has_velocity or (times == 5.0 and not in_amperes)
+    is_wrong = bool(wrong and not has_time and is_shown)
+    rate = None if has_time else RATE * (times if is_wrong else 1.0)
     return Drawn(path, rate, (time, q, effort), bool(in_amperes or is_wrong),
                  scale if is_counted else 1e-3)

@@ -312,7 +312,7 @@ class Search:
 
         Without times the velocities may be in any unit.
         """
-        if not self.factors and self.model.recorded.columns is not None and self.rate:
+        if self.rate and not self.factors and self.model.recorded.columns:
             for unit in table.RATES:
                 yield replace(self.rows[0], kind='rate', cost=table.COST['rate'], time_unit=unit,
                               what=f'there look to be {self.rate / unit:g} samples per second, '
@@ -362,8 +362,11 @@ class Search:
         # Masses that inertia contradicts are guesses, and so is their weight.
         if row.kind == table.WITHOUT_GRAVITY and fit.prior > table.PLAUSIBLE:
             return False
-        # What nothing explains, with any sign, may be external.
         evidence = self.evidence(fit.reading)
+        # Without weight, masses that are off look like another rate.
+        if row.kind == 'rate' and not self.factors:
+            return evidence is not None and evidence.has_weight
+        # What nothing explains, with any sign, may be external.
         return row.kind not in table.LACKING or fit.residual < table.GOOD_FIT or (
             evidence is not None and fit.residual < evidence.unexplained * (
                 table.NO_WORSE.get(row.kind, 0.0)))

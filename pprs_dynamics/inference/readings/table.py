@@ -33,7 +33,8 @@ COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
           for bits in (12, 10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
 POSITION_UNITS = frozenset((*LENGTHS, *ANGLES, *COUNTS))
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
-RATES = (0.1, 0.2, 0.5, 2.0, 5.0, 10.0)  # given over true ones
+# Given over true ones. At a lower rate inertia looks larger beside the weight, as rotors make it.
+RATES = (2.0, 5.0, 10.0)
 KGF_CM = 1 / 0.0980665
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
