@@ -85,10 +85,7 @@ def kinds_of(words: Collection[str]) -> set[str]:
     # A single letter next to a word is a prefix of programmers.
     for known in ({word for word in words if len(word) > 1}, words):
         kinds = kinds or {kind for kind, named in table.WORDS.items() if known & {*named}}
-    is_german = bool(words & {'ist', 'soll'})
-    if not kinds and is_german and 'm' in words:
-        return {EFFORT}
-    if not kinds and (words & table.OF_JOINTS or (is_german and 'a' in words)):
+    if not kinds and words & table.OF_JOINTS:
         return {POSITION}  # "joint torque" is no position
     return kinds - {EFFORT} if CURRENT in kinds else kinds
 
