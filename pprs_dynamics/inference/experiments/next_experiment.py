@@ -240,13 +240,11 @@ class Information:
 
     @cached_property
     def _sensitivities(self) -> Sensitivities:
-        found = Sensitivities(self.model, self.given)
-        found.restrict(
-            {term.component.effect for term in self.terms}
+        return Sensitivities(
+            self.model, self.given, {term.component.effect for term in self.terms}
             | {column.effect for column in self.base if isinstance(column, PresentParameter)}
             | {type(effect) for effect in self.given.effects
                if isinstance(effect, CatalogueEffect)})
-        return found
 
 
 def _key(column: BaseColumn) -> str:

@@ -97,10 +97,8 @@ class Design:
     base : tuple of BaseColumn
     structure : tuple of Term
         Effects that are not in single drives, those of the given model among them.
-    homing : tuple of dict of drive to (M,) array
+    homing : (D, D, M) array
         Change of all forces per metre that a drive is measured too far [N/m].
-    inertia : tuple of dict of drive to (M,) array
-        And per acceleration that it is measured too much [N s^2/m].
     notes : tuple of str
     reconstructions : tuple of Reconstruction
     forces : (M, D) array
@@ -119,8 +117,7 @@ class Design:
     recordings: tuple[FullRate, ...]
     base: tuple[BaseColumn, ...]
     structure: tuple[Term, ...]
-    homing: tuple[Mapping[int, Array], ...]
-    inertia: tuple[Mapping[int, Array], ...]
+    homing: Array
     notes: tuple[str, ...]
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
@@ -231,9 +228,9 @@ class Design:
         if carried is None:
             return self
         forces = carried.shown(self.residuals)
-        homing = self.homing and tuple(
-            {d: row - slope[:, d] for d, row in rows.items()}
-            for rows, slope in zip(self.homing, carried.per_position(self.residuals), strict=True))
+        homing = self.homing
+        if len(homing):
+            homing = homing - carried.per_position(self.residuals).swapaxes(1, 2)
         alone = carried.at_full_rate(self.recordings, self.residuals.time)
         recordings = tuple(replace(recording, effort=recording.effort + more)
                            for recording, more in zip(self.recordings, alone, strict=True))
@@ -318,10 +315,7 @@ class Design:
         known : mapping of str to (k, D, M) array, optional
             Columns that are not computed again.
         """
-        sensitivities = Sensitivities(model, given)
-        if effects is not None:
-            sensitivities.restrict(effects)
-        sensitivities.known = frozenset(known)
+        sensitivities = Sensitivities(model, given, effects, known)
         tables: list[dict[Any, Array]] = []
         full: list[FullRate] = []
         notes: list[str] = []
@@ -337,7 +331,7 @@ class Design:
 
     @classmethod
     def planned(cls, sensitivities: Sensitivities, forces: Forces, time: Array,
-                block: int = 1) -> Design:
+                block: int) -> Design:
         """Return the design of a planned motion, without measurements.
 
         All widths of reversal are open, since a drive that stood in a recording may move here.
@@ -366,14 +360,14 @@ class Design:
                               period=float(time[1] - time[0]) * block)
         widths = {(drive, number) for number in range(len(DRIVE_WIDTHS) + 1)
                   for drive in (None, *range(len(sensitivities.model.drives)))}
-        return cls._assembled(sensitivities, stacked, residuals, (full,), reversals=widths)
+        return cls._assembled(sensitivities, stacked, residuals, (full,), (), (), widths)
 
     @classmethod
     def _assembled(
         cls, sensitivities: Sensitivities, stacked: Mapping[str, Array], residuals: Residuals,
-        full: tuple[FullRate, ...], notes: tuple[str, ...] = (),
-        reconstructions: tuple[Reconstruction, ...] = (),
-        reversals: Container[tuple[int | None, int]] | None = None,
+        full: tuple[FullRate, ...], notes: tuple[str, ...],
+        reconstructions: tuple[Reconstruction, ...],
+        reversals: Container[tuple[int | None, int]] | None,
     ) -> Design:
         """Return the design of treated columns, (k, D, M) by name as `Sensitivities.columns`."""
         model, given = sensitivities.model, sensitivities.given
@@ -384,10 +378,9 @@ class Design:
             Term(effect, None, {}, {d: stacked[name][:, d] for d in range(count)})
             for name, effect in (
                 *((effect.name, effect) for effect in sensitivities.searched), *there))
-        homing, inertia = (tuple(dict(enumerate(column)) for column in stacked.get(name, ()))
-                           for name in (HOMING, INERTIA))
-        design = cls(given, model, residuals, full, (), structure, homing, inertia, notes,
-                     reconstructions, residuals.model, columns=stacked)
+        design = cls(given, model, residuals, full, (), structure,
+                     stacked.get(HOMING, np.zeros(0)), notes, reconstructions, residuals.model,
+                     columns=stacked)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
@@ -543,7 +536,7 @@ class Design:
 
         old = read(before)
 
-        def changed(c: Parameter, step: float) -> dict[int, Array] | None:
+        def changed(c: Parameter, step: float) -> Array | None:
             moved = read({**before, c.name: before[c.name] + step})
             if all(map(np.array_equal, old, moved)):
                 return None
@@ -551,11 +544,12 @@ class Design:
                 recording.treat(self._misreading_rows(recording, drive, new - as_read).T).T
                 for recording, as_read, new in zip(self.recordings, old, moved, strict=True)],
                 axis=1)
-            return {d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
-                    + rubbing * (d == drive) for d in range(len(self.drives))}
+            forces: Array = self.homing[drive] * q + self.columns[INERTIA][drive] * q_ddot
+            forces[drive] += rubbing
+            return forces
 
         error = np.nan_to_num(self.residuals.error[:, drive])
-        none = dict.fromkeys(range(len(self.drives)), np.zeros_like(error))
+        none = np.zeros((len(self.drives), len(error)))
         rows = []
         for c in effect.coefficients:
             usual = c.scale if c.expected is None else c.expected[self.given.units[drive].turns]
@@ -569,8 +563,8 @@ class Design:
                 found.append((step, rows_there))
             step, best = max(found, default=(1.0, none), key=lambda scored: float(
                 (2 * error - scored[1][drive]) @ scored[1][drive]))
-            rows.append({d: row / step for d, row in best.items()})
-        return {d: np.stack([row[d] for row in rows]) for d in range(len(self.drives))}
+            rows.append(best / step)
+        return dict(enumerate(np.stack(rows, axis=1)))
 
     def _misreading_rows(self, recording: FullRate, drive: int, change: Array) -> Array:
         """Return errors of position and acceleration, and what the drive's own friction makes.

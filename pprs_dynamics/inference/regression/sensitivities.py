@@ -9,7 +9,7 @@ coefficient, at one chunk of a recording, at full rate.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Collection, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, islice
@@ -115,6 +115,10 @@ class Sensitivities:
     given : DriveModel
         As the user gave it: what it has already is no candidate, and its numbers are those that
         tolerances are about.
+    effects : container of type of CatalogueEffect, optional
+        The only ones whose columns are computed; by default all that the model may have.
+    known : collection of str, optional
+        Names of columns that are not computed.
 
     Attributes
     ----------
@@ -123,30 +127,23 @@ class Sensitivities:
         Effects outside the drives that the given model could have and has not.
     of_zeros : bool
         Whether `HOMING` is needed.
-    known : frozenset of str
-        Names of columns that are not computed.
     """
 
-    def __init__(self, model: DriveModel, given: DriveModel) -> None:
-        self.model, self.given = model, given
+    def __init__(self, model: DriveModel, given: DriveModel,
+                 effects: Container[type[CatalogueEffect]] | None = None,
+                 known: Collection[str] = ()) -> None:
+        self.model, self.given, self.known = model, given, known
         self.numbers = model_numbers(given)
         present = {effect.name for effect in given.effects}
-        self.searched: tuple[type[StructureEffect], ...] = tuple(
-            bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
-            and given.offers(effect) and effect.name not in present
-            if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
-        self.of_zeros = any(effect.shifts_positions() and given.offers(effect)
-                            for effect in catalogue().values())
-        self.known = frozenset[str]()
+        offered = [given.bound(effect) for effect in catalogue().values() if given.offers(effect)]
+        if effects is not None:
+            offered = [effect for effect in offered if effect in effects]
+        self.searched = tuple(
+            effect for effect in offered if issubclass(effect, StructureEffect)
+            and effect.name not in present and effect.coefficients)
+        self.of_zeros = any(effect.shifts_positions() for effect in offered)
         self._steps: dict[type[BodyEffect], list[BodyEffect]] = {}  # by coefficient
         self._own: tuple[Any, Array] = None, np.empty(0)  # state, and efforts of the model there
-
-    def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
-        """Leave out columns that effects other than these would need."""
-        self.searched = tuple(effect for effect in self.searched if effect in effects)
-        if not any(effect.shifts_positions() and effect in effects
-                   for effect in catalogue().values()):
-            self.of_zeros = False
 
     def columns(self, forces: Any, treat: Treatment) -> dict[str, Array]:
         """Return treated columns by name, (M, K, D) each.
