@@ -90,14 +90,12 @@ def test_noise_is_called_noise_and_an_error_beyond_it_is_not() -> None:
     assert loud.unexplained == pytest.approx(0.5, rel=0.1)
 
 
-def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:
+def test_efforts_that_cannot_be_compared_are_refused_in_one_sentence() -> None:
     right = recording(np.zeros((50, 2)), np.ones((50, 2)))
     for change, words in [
-            ({'model': np.zeros((50, 3))}, 'model: its shape is'),
             ({'measured': np.full((50, 2), np.nan)}, 'none was measured on any drive'),
-            ({'variables': {'position': np.zeros(49)}}, "variables['position']"),
             ({'model': np.full((50, 2), np.inf)}, 'not finite')]:
-        with pytest.raises(ResidualsError, match=words.replace('[', r'\[')):
+        with pytest.raises(ResidualsError, match=words):
             replace(right, **change)
 
 

@@ -226,17 +226,12 @@ class SinceReference(JsonRecord):
         Share of each drive's squared error under the input model that they show as well.
     pace : float
         Speed of the drives over that in the reference runs, median over drives.
-    note : str
-        What must be known of them; '' for nothing.
     """
-
-    json_keys = ('recordings', 'covered', 'explained', 'pace')
 
     recordings: tuple[str, ...]
     covered: float
     explained: Mapping[str, float]
     pace: float
-    note: str
 
     @classmethod
     def of(cls, reference: Reference, design: Design) -> SinceReference:
@@ -251,7 +246,7 @@ class SinceReference(JsonRecord):
                        for residuals in (design.residuals, reference.regression.residuals))
         moved = there > 0
         pace = float(np.median(here[moved] / there[moved])) if moved.any() else 1.0
-        return cls(reference.names, design.carried.covered, explained, pace, reference.note)
+        return cls(reference.names, design.carried.covered, explained, pace)
 
 
 @dataclass(frozen=True)
@@ -318,8 +313,8 @@ class Diagnosis(JsonRecord):
         'calibrated', 'detectable', 'held_out_on', 'above_noise', 'noise_floor', 'noise_floors',
         'warnings', 'refit', 'candidates', 'suspects', 'stick_slip', 'effort_looks_like',
         'explained', 'little_explained', 'reference')
-    json_attributes = (('refit', 'refit_errors'), ('effort_looks_like', 'kinds_of_effort'),
-                       ('little_explained', 'little'), ('reference', 'since'))
+    json_attributes = (('effort_looks_like', 'kinds_of_effort'), ('little_explained', 'little'),
+                       ('reference', 'since'))
 
     verdict: str
     effects: tuple[FoundEffect, ...]
@@ -369,15 +364,12 @@ class Diagnosis(JsonRecord):
         """Root of the mean square of `noise_floors` [N]."""
         return root_mean_square(list(self.noise_floors.values()))
 
-    @cached_property
-    def refit(self) -> float:
-        """Error with the fitted numbers of the model but without the effects [N]."""
-        return root_mean_square(sum((effect.force for effect in self.effects), self.remaining))
-
     @property
-    def refit_errors(self) -> dict[str, float]:
+    def refit(self) -> dict[str, float]:
         """`error_before` and `error_after` a refit of the model's numbers, without the effects."""
-        return {'error_before': root_mean_square(self.residuals.error), 'error_after': self.refit}
+        without = sum((effect.force for effect in self.effects), self.remaining)
+        return {'error_before': root_mean_square(self.residuals.error),
+                'error_after': root_mean_square(without)}
 
     @property
     def kinds_of_effort(self) -> dict[str, str] | None:

@@ -280,7 +280,7 @@ def word_reference(since: SinceReference | None) -> tuple[str, ...]:
     if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
         words.append(f'this recording moves at {since.pace:.2g} times the speed of the reference: '
                      'confirm a delay or a hysteresis with a reference of this speed')
-    return (*words, since.note) if since.note else tuple(words)
+    return tuple(words)
 
 
 # The headline

@@ -61,7 +61,6 @@ LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
 LEAST_COUNT = 1.0  # determined coefficients, over which the size of a process is taken
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
-LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_DIRECTIONS = 24  # that become columns of all drives together
 # States on which a process is conditioned, over all drives and over one, and further ones of
@@ -328,14 +327,6 @@ class Reference:
     def names(self) -> tuple[str, ...]:
         """Names of the recordings."""
         return tuple(recording.name for recording in self.recordings)
-
-    @property
-    def note(self) -> str:
-        """Warning that the errors of the runs hardly repeat; '' for none."""
-        if np.max(self.repeats) < LEAST_REPEATS:
-            return (f'the error of {", ".join(self.names)} does not repeat: of the reference only '
-                    'the numbers of the base are used')
-        return ''
 
     def carried_over(self, design: Design) -> CarriedOver:
         """Return the predicted forces on the recordings of a design, with their uncertainty."""

@@ -67,7 +67,7 @@ class Residuals:
     Raises
     ------
     ResidualsError
-        For a wrong shape, a non-finite model or variable, or nothing measured.
+        For a non-finite model or variable, or nothing measured.
     """
 
     drives: tuple[str, ...]
@@ -83,26 +83,13 @@ class Residuals:
         default_factory=lambda: np.zeros(0, dtype=int))
 
     def __post_init__(self) -> None:
-        samples, width = len(self.time), len(self.drives)
         if not len(self.record):
             object.__setattr__(self, 'record', self.segment)
-        table = {'measured': self.measured, 'model': self.model,
-                 **{f'parts[{name!r}]': part for name, part in self.parts.items()}}
-        for name, array in table.items():
-            _require(array.shape == (samples, width), name, f'its shape is {array.shape}',
-                     f'be ({samples}, {width}), samples by drives')
-        for name, array in self.variables.items():
-            _require(array.shape in ((samples,), (samples, width)), f'variables[{name!r}]',
-                     f'its shape is {array.shape}', f'be ({samples},) or ({samples}, {width})')
-        for name, numbers in (('segment', self.segment), ('record', self.record)):
-            _require(numbers.shape == (samples,), name, f'its shape is {numbers.shape}',
-                     f'be ({samples},)')
-        for name, array in {**table, **self.variables, 'time': self.time}.items():
-            _require(name == 'measured' or bool(np.isfinite(array).all()), name,
+        for name, array in {'model': self.model, **self.variables}.items():
+            _require(bool(np.isfinite(array).all()), name,
                      'it contains a number that is not finite', 'be finite')
         _require(bool(np.isfinite(self.measured).any()), 'effort', 'none was measured on any drive',
                  'be recorded with the positions (<drive>/effort in a CSV, effort in JointState)')
-        _require(self.period > 0, 'period', f'it is {self.period}', 'be greater than 0 s')
 
     def blocks(self, count: int) -> Integers:
         """Return in which of `count` blocks of equal length each sample is, (M,)."""
