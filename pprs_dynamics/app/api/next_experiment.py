@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.pictures import plot_over_time
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
-from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
+from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -208,7 +208,6 @@ def next_experiment(
         As `diagnose`.
     """
     inputs = Inputs.of(model, recordings, (), topic, progress)
-    check_purpose(purpose, inputs.fitted)
     designed = design(inputs.model, inputs.fitted, purpose, duration=duration, seed=seed,
                       progress=stage(progress, 'designing'))
     count = int(duration * rate + 1e-9) + 1

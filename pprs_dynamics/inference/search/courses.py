@@ -54,7 +54,7 @@ class _Offer:
 
 
 def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[CandidateSet],
-                first: FittedSets | None = None) -> None:
+                first: FittedSets | None) -> None:
     """Fit sets in which effects begin, end or grow, where the score test of onsets passes.
 
     Parameters
@@ -65,7 +65,7 @@ def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[Candid
         Of these, without onsets.
     alone : sequence of CandidateSet
         Of one effect each, that may be the right one with an onset.
-    first : FittedSets, optional
+    first : FittedSets or None
         Around the input model, where the reported set is nonlinear: the search is repeated there,
         since a nonlinear constant effect may imitate an onset around its own model.
     """

@@ -26,7 +26,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -74,7 +74,7 @@ def noise_at_most(floor: float, bound: float) -> float:
 
 def measure_columns(
     model: DriveModel, recordings: Sequence[Recording],
-    progress: Callable[[float], None] = lambda share: None, decisions: Decisions = DECISIONS,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[FittedSets | None, Residuals, tuple[str, ...]]:
     """Return columns of the largest fit, and the results of `measure_residuals`.
 
@@ -87,7 +87,6 @@ def measure_columns(
     recordings : sequence of Recording
     progress : callable, optional
         Called with the share of the work that is done.
-    decisions : Decisions, optional
 
     Raises
     ------
@@ -101,7 +100,7 @@ def measure_columns(
     design = Design.of(model, piece, lambda share: progress(0.5 + 0.5 * share if whole else share))
     residuals, notes = whole or (design.residuals, design.notes)
     try:
-        return FittedSets(design, decisions), residuals, notes
+        return FittedSets(design, DECISIONS), residuals, notes
     except ResidualsError:
         return None, residuals, notes
 

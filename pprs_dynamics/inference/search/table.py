@@ -292,7 +292,7 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
 
 
 def input_model_alone(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
-                      progress: Callable[[float], None] | None = None) -> ModelTable:
+                      progress: Callable[[float], None]) -> ModelTable:
     """Return the table of the row without any effect; errors as `measure_residuals`."""
     fits = FittedSets(Design.of(model, recordings, progress), decisions)
     fits.evaluate(())
