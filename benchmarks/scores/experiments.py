@@ -40,7 +40,7 @@ from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.motion_design import MotionLimits, Motions
+from pprs_dynamics.inference.experiments.motion_design import Motions
 from pprs_dynamics.inference.experiments.next_experiment import (
     Question,
     design_experiment,
@@ -132,7 +132,7 @@ def ambiguous_start(name: str, seed: int) -> Start | None:
         for scale in SCALES:
             robot = HiddenRobot(name, seed, scale)
             old = robot.record(motion, 0)
-            question = question_of(robot.model, [old], Motions(robot.model, MotionLimits(), NEW),
+            question = question_of(robot.model, [old], Motions(robot.model, NEW),
                                    lambda share: None)
             if rivals_of(name, question):
                 return Start(robot, how, motion, old, question)
@@ -159,7 +159,7 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
     if start is None:
         return None
     robot, old, question = start.robot, start.recording, start.question
-    motions = Motions(robot.model, MotionLimits(effort_reserve=4 * question.noise_floor), NEW)
+    motions = Motions(robot.model, NEW, 4 * question.noise_floor)
     cpu, wall = time.process_time(), time.perf_counter()
     experiment = design_experiment(question, motions, seed)
     cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}

@@ -19,12 +19,7 @@ from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.experiments import motion_design
-from pprs_dynamics.inference.experiments.motion_design import (
-    MotionLimits,
-    Motions,
-    NoMotionError,
-    room,
-)
+from pprs_dynamics.inference.experiments.motion_design import Motions, NoMotionError, room
 from pprs_dynamics.inference.experiments.motion_design import design as design_motion
 from pprs_dynamics.inference.experiments.next_experiment import (
     FittedTerm,
@@ -66,7 +61,7 @@ def series(model: DriveModel) -> JointSeries:
 
 
 def moved(model: DriveModel, series: JointSeries, time: np.ndarray) -> PlatformMotion:
-    return Motions(model, MotionLimits(), DURATION).sampled(series, time)
+    return Motions(model, DURATION).sampled(series, time)
 
 
 # Paths.
@@ -146,12 +141,13 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
     model: DriveModel, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every limit in turn is made the one that stops the motion."""
-    monkeypatch.setattr(motion_design, 'STEPS', 40)
+    for name, value in (('STEPS', 40), ('SLIDE_SPEED', 0.1), ('ACCELERATION', 0.5), ('TILT', 0.1)):
+        monkeypatch.setattr(motion_design, name, value)
     tight = DriveModel.from_parameters({
         **model.values, 'limits.lift_stroke': (0.12, 0.30),
         'limits.effort': (9.0,) * 3 + (18.0,) * 3, 'limits.condition_number': 2.2,
         'limits.rod_sine': 0.45})
-    motions = Motions(tight, MotionLimits(velocity=0.1, acceleration=0.5, tilt=0.1), DURATION)
+    motions = Motions(tight, DURATION)
 
     def size(series: JointSeries) -> float:
         return float(np.abs(series.coefficients).sum())
@@ -179,7 +175,7 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
 def test_no_room_is_said(model: DriveModel) -> None:
     weak = replace(model, limits=model.limits.with_efforts((1.0,) * 6))
     with pytest.raises(NoMotionError, match=r'no motion is allowed.*effort of lift'):
-        Motions(weak, MotionLimits(), DURATION)
+        Motions(weak, DURATION)
 
 
 # Motions that excite an arm: within its limits, at rest at both ends, and worth their time.

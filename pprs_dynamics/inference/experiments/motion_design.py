@@ -32,6 +32,12 @@ from pprs_dynamics.physics.model.forces import Forces
 
 WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
 SLIDE_SPEED = 0.5  # [m/s], of the 3-PPRS, whose file has no limit of speed
+ACCELERATION = 5.0  # [m/s^2, rad/s^2], of every drive
+TILT = 0.35  # [rad], of the platform of the 3-PPRS against the horizontal
+# Of the drive Jacobian of the 3-PPRS. Towards a singularity small errors of the model grow large,
+# and a few moments there would carry all the evidence.
+CONDITION_NUMBER = 8.0
+USED = 0.9  # share of every limit
 DRAWS, STEPS = 40, 160  # random motions, and steps from the best
 FIRST, LAST = 0.3, 0.03  # size of the steps, relative to the largest coefficient
 HALVINGS = 7
@@ -43,77 +49,6 @@ OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
 HARMONICS, HIGHEST_FREQUENCY = (4, 8, 16), 1.5
 SMALLEST = 0.2  # share of the largest excursion of a coordinate; small motion shows hysteresis
 Random = np.random.Generator
-
-
-@dataclass(frozen=True)
-class MotionLimits:
-    """Limits of a motion in addition to those of the model file. Collisions are not checked.
-
-    Parameters
-    ----------
-    velocity : float or None
-        Of every drive [m/s, rad/s]; None: 0.5 for the 3-PPRS, that of the URDF for others.
-    acceleration : float
-        Of every drive [m/s^2, rad/s^2].
-    tilt : float
-        Of the platform of the 3-PPRS against the horizontal [rad].
-    condition_number : float
-        Of the drive Jacobian of the 3-PPRS. Towards a singularity small errors of the model grow
-        large, and a few moments there would carry all the evidence.
-    margin : float
-        Share of every limit that is left unused, 0 to 0.9.
-    effort_reserve : float
-        Taken off the efforts for what the model does not know of [N, N m].
-    """
-
-    velocity: float | None = None
-    acceleration: float = 5.0
-    tilt: float = 0.35
-    condition_number: float = 8.0
-    margin: float = 0.1
-    effort_reserve: float = 0.0
-
-    def excursions(self, model: DriveModel, motion: JointMotion) -> Array:
-        """Return the largest use of range, speed and acceleration of each drive, (D,)."""
-        found: Array = np.max([share.max(axis=0) for share in self._of_drives(
-            model, motion.position, motion.velocity, motion.acceleration).values()], axis=0)
-        return found
-
-    def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
-        """Return the share of each limit, less a margin, that a motion uses."""
-        state, left = forces.mechanism, 1 - self.margin
-        shares = self._of_drives(model, state.position, state.velocity, state.acceleration)
-        shares['effort'] = (np.abs(forces.total) + self.effort_reserve) / (
-            left * model.limits.efforts)
-        found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
-                 for d, drive in enumerate(model.drives)}
-        return {name: float(share.max()) for name, share in (
-            {**found, **self._of_platform(model, state)} if model.robot.plans_poses else found
-        ).items()}
-
-    def _of_drives(self, model: DriveModel, position: Array, velocity: Array,
-                   acceleration: Array) -> dict[str, Array]:
-        """Return the use of range, speed and acceleration of every drive, (N, D) each."""
-        middle, reach = room(model)
-        usual = SLIDE_SPEED if model.robot.plans_poses else np.inf
-        fastest = np.minimum(model.robot.structure.speed, self.velocity or usual)
-        return {name: np.abs(values) / ((1 - self.margin) * bound) for name, values, bound in (
-            ('range', position - middle, np.maximum(reach, 1e-12)),
-            ('velocity', velocity, fastest), ('acceleration', acceleration, self.acceleration))}
-
-    def _of_platform(self, model: DriveModel, state: Any) -> dict[str, Array]:
-        """Return the use of what limits the 3-PPRS alone, (N,) each."""
-        robot: Any = model.robot
-        bounds, left, (u, *_) = robot.bounds, 1 - self.margin, robot.rods(state.links)
-        angles = {'rod angle of chain': (1 - np.abs(np.sin(u))) / (left * (1 - bounds.rod_sine))}
-        if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
-            angles['cosine of rod angle'] = (1 - np.abs(np.cos(u))) / (
-                left * (1 - bounds.rod_cosine))
-        return {
-            **{f'{name} {k + 1}': share[:, k] for name, share in angles.items() for k in range(3)},
-            'tilt of the platform': robot.variables(state)['platform_tilt'] / (left * self.tilt),
-            'condition number': robot.condition_number(robot.jacobian(state.links)) / (
-                left * min(bounds.condition_number, self.condition_number))}
 
 
 class NoMotionError(PprsError, ValueError):
@@ -131,15 +66,17 @@ def room(model: DriveModel) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Motions:
-    """The motions of one duration among which a design searches.
+    """The motions of one duration among which a design searches, within limits.
+
+    Those of the model file, and those above. Collisions are not checked.
 
     Parameters
     ----------
     model : DriveModel
-    limits : MotionLimits
-        In addition to those of the model.
     duration : float
         [s]
+    effort_reserve : float
+        Taken off the efforts for what the model does not know of [N, N m].
 
     Raises
     ------
@@ -150,8 +87,8 @@ class Motions:
     """
 
     model: DriveModel
-    limits: MotionLimits
     duration: float
+    effort_reserve: float = 0.0
 
     def __post_init__(self) -> None:
         standing = JointSeries(np.zeros((len(self.middle), JointSeries.size(2))), self.middle,
@@ -182,7 +119,39 @@ class Motions:
         """Return the use of each limit, its margin taken off; by default at the full rate."""
         if time is None:
             time = np.arange(round(self.duration * FINE_RATE) + 1) / FINE_RATE
-        return self.limits.uses(self.model, self.forces(series, time))
+        model, forces = self.model, self.forces(series, time)
+        state: Any = forces.mechanism
+        shares = self._of_drives(state.position, state.velocity, state.acceleration)
+        shares['effort'] = (np.abs(forces.total) + self.effort_reserve) / (
+            USED * model.limits.efforts)
+        found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
+                 for d, drive in enumerate(model.drives)}
+        return {name: float(share.max()) for name, share in (
+            {**found, **self._of_platform(state)} if model.robot.plans_poses else found).items()}
+
+    def _of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                   ) -> dict[str, Array]:
+        """Return the use of range, speed and acceleration of every drive, (N, D) each."""
+        middle, reach = room(self.model)
+        usual = SLIDE_SPEED if self.model.robot.plans_poses else np.inf
+        fastest = np.minimum(self.model.robot.structure.speed, usual)
+        return {name: np.abs(values) / (USED * bound) for name, values, bound in (
+            ('range', position - middle, np.maximum(reach, 1e-12)),
+            ('velocity', velocity, fastest), ('acceleration', acceleration, ACCELERATION))}
+
+    def _of_platform(self, state: Any) -> dict[str, Array]:
+        """Return the use of what limits the 3-PPRS alone, (N,) each."""
+        robot: Any = self.model.robot
+        bounds, (u, *_) = robot.bounds, robot.rods(state.links)
+        angles = {'rod angle of chain': (1 - np.abs(np.sin(u))) / (USED * (1 - bounds.rod_sine))}
+        if any(isinstance(effect, IndependentChainsFriction) for effect in self.model.effects):
+            angles['cosine of rod angle'] = (1 - np.abs(np.cos(u))) / (
+                USED * (1 - bounds.rod_cosine))
+        return {
+            **{f'{name} {k + 1}': share[:, k] for name, share in angles.items() for k in range(3)},
+            'tilt of the platform': robot.variables(state)['platform_tilt'] / (USED * TILT),
+            'condition number': robot.condition_number(robot.jacobian(state.links)) / (
+                USED * min(bounds.condition_number, CONDITION_NUMBER))}
 
     def draw(self, random: Random) -> JointSeries:
         """Return a random motion: each coordinate has a random share of its largest size."""
@@ -232,8 +201,11 @@ class Motions:
             return OUTSIDE
 
     def _excursions(self, series: JointSeries) -> Array:
-        return np.maximum(self.limits.excursions(
-            self.model, series.motion(coarse_time(series))), 1e-12)
+        """Return the largest use of range, speed and acceleration of each drive, (D,)."""
+        motion = series.motion(coarse_time(series))
+        largest: Array = np.max([share.max(axis=0) for share in self._of_drives(
+            motion.position, motion.velocity, motion.acceleration).values()], axis=0)
+        return np.maximum(largest, 1e-12)
 
     def _sized(self, series: JointSeries, share: Array) -> JointSeries:
         """Return a motion in which each coordinate has a share of its largest size."""

@@ -33,12 +33,7 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.motion_design import (
-    MotionLimits,
-    Motions,
-    coarse_time,
-    design,
-)
+from pprs_dynamics.inference.experiments.motion_design import Motions, coarse_time, design
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
     ModelNumber,
@@ -688,10 +683,10 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    motions = Motions(model, MotionLimits(), duration)
+    motions = Motions(model, duration)
     question = (commissioning(model, recordings, motions) if purpose == COMMISSION else
                 question_of(model, recordings, motions, lambda share: report(0.2 * share)))
-    motions = replace(motions, limits=MotionLimits(effort_reserve=RESERVE * question.noise_floor))
+    motions = replace(motions, effort_reserve=RESERVE * question.noise_floor)
     return design_experiment(question, motions, seed, lambda share: report(0.2 + 0.8 * share))
 
 
