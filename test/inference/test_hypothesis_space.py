@@ -118,7 +118,7 @@ def random_design(truth: Mapping[tuple[str, int | None], float], seed: int) -> R
     base = (BaseColumn({d: curve(1)[0] for d in range(len(DRIVES))}, 1.0),)
     structure = tuple(Term(effect, None, {}, columns[effect.name, None])
                       for effect in IN_STRUCTURE)
-    return RandomDesign(MODEL, MODEL, residuals, (), base, structure, (), (), (), (), error,
+    return RandomDesign(MODEL, MODEL, residuals, (), base, structure, (), (), error,
                         columns=columns)
 
 

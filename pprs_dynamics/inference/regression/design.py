@@ -99,7 +99,6 @@ class Design:
         Effects that are not in single drives, those of the given model among them.
     homing : (D, D, M) array
         Change of all forces per metre that a drive is measured too far [N/m].
-    notes : tuple of str
     reconstructions : tuple of Reconstruction
     forces : (M, D) array
         Of `model`, exactly [N].
@@ -118,7 +117,6 @@ class Design:
     base: tuple[BaseColumn, ...]
     structure: tuple[Term, ...]
     homing: Array
-    notes: tuple[str, ...]
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
@@ -134,6 +132,11 @@ class Design:
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return self.residuals.drives
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the motion of the recordings was found, in words."""
+        return tuple(note for found in self.reconstructions for note in found.notes)
 
     def named(self, drives: Iterable[int] | None) -> tuple[str, ...] | None:
         """Return the names of some drives; None of the structure, which is no drive's."""
@@ -318,16 +321,14 @@ class Design:
         sensitivities = Sensitivities(model, given, effects, known)
         tables: list[dict[Any, Array]] = []
         full: list[FullRate] = []
-        notes: list[str] = []
         for k, reconstruction in enumerate(reconstructions):
             collector = ColumnCollector(sensitivities, reconstruction)
             tables.append(treated_table(model, reconstruction, progress_of(
                 report, k, len(reconstructions)), collector))
             full.append(collector.full_rate(reconstruction))
-            notes += reconstruction.notes
         stacked = {**known, **stacked_columns(tables)}
         return cls._assembled(sensitivities, stacked, join_tables(model, tables), tuple(full),
-                              tuple(notes), reconstructions, reversals)
+                              reconstructions, reversals)
 
     @classmethod
     def planned(cls, sensitivities: Sensitivities, forces: Forces, time: Array,
@@ -360,13 +361,12 @@ class Design:
                               period=float(time[1] - time[0]) * block)
         widths = {(drive, number) for number in range(len(DRIVE_WIDTHS) + 1)
                   for drive in (None, *range(len(sensitivities.model.drives)))}
-        return cls._assembled(sensitivities, stacked, residuals, (full,), (), (), widths)
+        return cls._assembled(sensitivities, stacked, residuals, (full,), (), widths)
 
     @classmethod
     def _assembled(
         cls, sensitivities: Sensitivities, stacked: Mapping[str, Array], residuals: Residuals,
-        full: tuple[FullRate, ...], notes: tuple[str, ...],
-        reconstructions: tuple[Reconstruction, ...],
+        full: tuple[FullRate, ...], reconstructions: tuple[Reconstruction, ...],
         reversals: Container[tuple[int | None, int]] | None,
     ) -> Design:
         """Return the design of treated columns, (k, D, M) by name as `Sensitivities.columns`."""
@@ -379,7 +379,7 @@ class Design:
             for name, effect in (
                 *((effect.name, effect) for effect in sensitivities.searched), *there))
         design = cls(given, model, residuals, full, (), structure,
-                     stacked.get(HOMING, np.zeros(0)), notes, reconstructions, residuals.model,
+                     stacked.get(HOMING, np.zeros(0)), reconstructions, residuals.model,
                      columns=stacked)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)

@@ -129,8 +129,6 @@ class Reconstruction(DriveMotion):
         delays : (D,) array
             By which efforts are measured late; early where negative [s].
         """
-        if not np.any(delays):
-            return self
         effort = self.effort.copy()
         for part, grid in zip(self.segments, self.grids, strict=True):
             # A delay is known to half a step.
