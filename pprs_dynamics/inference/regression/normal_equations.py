@@ -132,7 +132,7 @@ class Prior:
         limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
         return cls(precision, mean, log_det, limited)
 
-    def posterior(self, gram: Array, side: Array, beyond: Array | None = None) -> Posterior:
+    def posterior(self, gram: Array, side: Array) -> Posterior:
         """Return the posterior of coefficients, given X^T S^-1 X and X^T S^-1 y.
 
         A number beyond its tolerance is held back by a prior that is much steeper there.
@@ -141,13 +141,11 @@ class Prior:
         ----------
         gram : (P, P) array
         side : (P,) array
-        beyond : (P,) array, optional
-            Where numbers are tried first, see `Posterior`; there is one solution.
         """
         if not len(side):
-            return Posterior(self.mean, gram, 0.0, 0.0, side)
+            return Posterior(self.mean, gram, 0.0, 0.0)
         b = side - gram @ self.mean
-        beyond = np.zeros(len(b)) if beyond is None else beyond.copy()
+        beyond = np.zeros(len(b))  # +-1 for numbers beyond their tolerance, else 0
         open_prior = gram + self.precision
         diagonal = np.diag(open_prior) * (1 + 1e-12)  # of Cholesky's factor rounding is as small
         for number in range(MOST_LIMITED):
@@ -172,7 +170,7 @@ class Prior:
             np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
         log_det = 2 * float(np.log(np.einsum('ii->i', factor)).sum())
         log_det += self._both_sides(away, np.einsum('ii->i', covariance), beyond)
-        return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det, beyond)
+        return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
 
     def _both_sides(self, away: Array, variance: Array, beyond: Array) -> float:
         """Return the correction of -2 ln of the integral for numbers with a tolerance.
@@ -200,16 +198,12 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Coefficients given a noise: mean, covariance, c'Lc of the prior, and ln det (H + L) / L.
-
-    `beyond` is +-1 for numbers beyond their tolerance, else 0.
-    """
+    """Coefficients given a noise: mean, covariance, c'Lc of the prior, and ln det (H + L) / L."""
 
     coefficients: Array
     covariance: Array
     penalty: float
     log_det: float
-    beyond: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +254,6 @@ class NormalEquations:
         ends = accumulate((block.size for block in blocks), initial=len(columns))
         self.places = {block: slice(end, end + block.size)
                        for block, end in zip(blocks, ends, strict=False)}
-        self._beyond: Array | None = None  # of the solution before
         acting = {d: [block for block in blocks if d in block.rows] for d in base_index}
         most = max(len(index) + sum(block.size for block in acting[d])
                    for d, index in base_index.items())
@@ -315,8 +308,7 @@ class NormalEquations:
     def solve(self, spectra: Array, counts: Array) -> Solution:
         """Return the solution under noise spectra (D, B)."""
         weights = 1 / spectra
-        found = self.prior.posterior(*self.weighted(weights), self._beyond)
-        self._beyond = found.beyond
+        found = self.prior.posterior(*self.weighted(weights))
         squares = self.left(found.coefficients)
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
                          + found.penalty + found.log_det)
