@@ -316,7 +316,7 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
 
     And with those of the set with a form error, as which it costs no more. Where a set is
     inadmissible by its exact forces, also with that of its best part, from where that is in it: by
-    itself an effect stands for others, too, and may end far from there.
+    itself an effect takes the place of others, too, and may end far from there.
     """
     found = dict(exact)
     if fitted.with_form is not None:
