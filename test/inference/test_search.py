@@ -87,6 +87,15 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     assert costs[0] < tilted.total
 
 
+def test_a_form_error_explains_nothing_where_exact_forces_leave_nothing() -> None:
+    """What other columns explained of linear forces was counted on top of what exact ones do."""
+    effects = {'effort_filter': {'time_constant': 0.014},
+               'stribeck_friction': {'force': 2.0, 'velocity': 0.1}}
+    best = tabulate(axis(), [axis_recording(axis(effects), noise=0.03)], DECISIONS).best
+    assert names(best.fitted) == sorted(effects)
+    assert best.fitted.terms.forms == pytest.approx(0, abs=2)
+
+
 def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
     hidden = {f'{drive}.zero': 0.004 for drive in DRIVES[:2]}
     fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
