@@ -35,9 +35,6 @@ from pprs_dynamics.inference.search.form_error import FormErrors
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 SHAPE_DIGITS = 4  # of a shape: at the optimum a cost changes by less than the least improvement
-# Falls of the cost by a better shape, over that which a Gauss-Newton step predicts: with more the
-# set becomes no rival of the best one, and its shape does not matter.
-PROSPECT = 4.0
 NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 ROUNDING = 1e-12  # of correlations
@@ -295,9 +292,7 @@ class FittedSets:
             return None
         blocks = dict.fromkeys(slopes.values())
         fit = self.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
-        gain = _gain(fit, list(blocks))
-        if not moved and (gain < LEAST_IMPROVEMENT or fitted.cost - PROSPECT * gain
-                          > self.best.cost + self.decisions.rival_margin):
+        if not moved and _gain(fit, list(blocks)) < LEAST_IMPROVEMENT:
             return None
         shapes: dict[Block, dict[str, float]] = {}
         for component, block in slopes.items():
