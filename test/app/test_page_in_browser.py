@@ -136,7 +136,7 @@ def test_figures_over_time_share_their_span_and_their_cursor(see: Any) -> None:
         [...document.querySelectorAll('.plot[data-time]')].at(-1), {'xaxis.range': [3, 4]})''')
     seen.tab.wait_for_function(f'{ranges}.every((range) => range[0] === 3 && range[1] === 4)')
     last = seen.tab.query_selector_all('.plot[data-time]')[-1]
-    last.scroll_into_view_if_needed()
+    last.evaluate('(plot) => plot.scrollIntoView()')
     box = last.bounding_box()
     seen.tab.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 3)
     seen.tab.mouse.move(box['x'] + box['width'] / 2 + 5, box['y'] + box['height'] / 3)

@@ -117,6 +117,7 @@ class Seen:
         self.tab.evaluate("document.querySelectorAll('details').forEach((d) => d.open = true)")
         plots = self.tab.query_selector_all('.plot')
         for number, plot in enumerate(plots, start=1):
-            plot.scroll_into_view_if_needed()
+            # Not Playwright's way, which waits for frames that a busy machine may not paint.
+            plot.evaluate('(plot) => plot.scrollIntoView()')
             self.drawn(number)
         return len(plots)
