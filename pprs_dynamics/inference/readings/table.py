@@ -143,10 +143,9 @@ OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'a
 PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
 # Titles with one of these name neither a joint's measured motion nor its effort.
 OTHERS = frozenset((
-    'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'voltage',
-     'power', 'tcp', 'cartesian', 'pose', 'ee', 'twist', 'wrench',
-    'gravity', 'limit', 'error', 'err', 'action', 'reward', 'index', 'episode', 'frame', 'done',
-    'tracking'))
+    'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'voltage', 'power', 'tcp',
+    'cartesian', 'pose', 'ee', 'twist', 'wrench', 'gravity', 'limit', 'error', 'err', 'action',
+    'reward', 'index', 'episode', 'frame', 'done', 'tracking'))
 # Words of commands, which are read only where nothing is measured.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',

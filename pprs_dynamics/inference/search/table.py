@@ -19,7 +19,6 @@ from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
-    Candidates,
     CandidateSet,
     CostTerms,
     EffectCandidate,
@@ -264,23 +263,23 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     design = design.beside(carry_over and carry_over(design))
     first = FittedSets(design, decisions)
-    fits, patterns, exact = first, patterns_of(first), dict[RowKey, Row]()
-    start: Candidates = ()
+    patterns, exact, best = patterns_of(first), dict[RowKey, Row](), Row(first, first.evaluate(()))
     left = 0.65  # of the work: each search has half of what is left
 
     def searched(share: float) -> None:
         report(0.9 - left * (1 - share / 2))
 
     for number in range(MOST_SEARCHES):
+        point = best.fits.design.point
+        fits = first if point is None else first.around(point)
         search = Search(fits, patterns if fits is first else patterns_of(fits), searched)
-        search.run(start)
+        search.run(best.fitted.candidates)
         exact = _with_exact_costs(search, first, exact)
         best = min(exact.values(), key=lambda row: row.cost)
         if search.is_ended and (number or (not best.fitted.is_nonlinear and abs(
                 first.evaluate(best.fitted.candidates).total - best.fitted.total) < LEAST_CHANGE)):
             break
-        point, start = best.fits.design.point, best.fitted.candidates
-        fits, left = first if point is None else first.around(point), left / 2
+        left /= 2
     table = with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
     fit_courses(table.last, table.reported, list(table.alone.values()),
                 None if first is search.fits else first)
@@ -362,7 +361,7 @@ def _exchanged(table: ModelTable) -> list[Row]:
     Of those that by themselves explain nearly as much.
     """
     fitted, fits = table.best.fitted, table.last
-    known = {c.placed_name for c in fitted.effects}
+    known = {effect.name for effect in fitted.effects}
     alone = {name: other for name, other in table.alone.items() if other.is_nonlinear}
     none = table.first.evaluate(()).cost
     return [Row(fits, fits.evaluate(exchanged(fitted, effect, other.candidates[0])))
