@@ -6,19 +6,21 @@
 from __future__ import annotations
 
 import doctest
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 import pprs_dynamics.inference.regression.fit as fit_module
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber, ReversalShape
 from pprs_dynamics.inference.regression.fit import Prior as NamedPrior
 from pprs_dynamics.inference.regression.fit import fit
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
-from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE, Block, Prior
+from pprs_dynamics.inference.regression.normal_equations import Block, Prior
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
@@ -85,21 +87,27 @@ def test_the_deviance_is_the_likelihood_with_the_coefficients_integrated_out() -
                 assert fit.of(block) == pytest.approx(1.0, abs=1e-9)
 
 
+def limited(column: type[BaseColumn], count: int, *place: Any) -> Prior:
+    return Prior.of([column({}, 1.0, *place) for _ in range(count)], ())
+
+
+@pytest.mark.parametrize('prior', [limited(ModelNumber, 1, None), limited(ReversalShape, 1, 0, 0)])
 @pytest.mark.parametrize('information', [0.5, 2.0, 20.0, 200.0])
-def test_the_cost_of_a_number_near_its_tolerance_is_its_integral(information: float) -> None:
-    prior = Prior(np.eye(1), np.zeros(1), 0.0, np.ones(1, dtype=bool))
-    x, step = np.linspace(-20, 20, 40_001, retstep=True)
-    beyond = np.maximum(np.abs(x) - DEVIATIONS, 0.0)
+def test_the_cost_of_a_number_near_its_limit_is_its_integral(
+    prior: Prior, information: float,
+) -> None:
+    x = 1e-5 * np.sinh(np.linspace(-15, 15, 40_001))  # fine at 0, where what is beyond is narrow
+    beyond = x - np.clip(x, *prior.limits[:, 0])
     found = []
-    for measured in np.linspace(0, 3 * DEVIATIONS * (1 + 1 / information), 60):
+    for measured in np.linspace(-1, 3 * DEVIATIONS * (1 + 1 / information), 60):
         posterior = prior.posterior(np.array([[information]]), np.array([information * measured]))
         away = posterior.coefficients[0]
         found.append(information * (away - measured) ** 2 + posterior.penalty + posterior.log_det)
         density = np.exp(-0.5 * (information * (x - measured) ** 2 + x ** 2
-                                 + BEYOND_TOLERANCE * beyond ** 2))
+                                 + prior.beyond * beyond ** 2))
         # But for what lies beyond the other limit.
         assert found[-1] == pytest.approx(
-            -2 * np.log(step * density.sum() / np.sqrt(2 * np.pi)), abs=5e-3)
+            -2 * np.log(trapezoid(density, x) / np.sqrt(2 * np.pi)), abs=5e-3)
 
 
 @pytest.mark.parametrize('seed', [1, 16])
@@ -107,7 +115,7 @@ def test_the_cost_has_no_step_where_numbers_that_lean_on_each_other_pass_toleran
     seed: int,
 ) -> None:
     rng = np.random.default_rng(seed)
-    prior = Prior(np.eye(4), np.zeros(4), 0.0, np.ones(4, dtype=bool))
+    prior = limited(ModelNumber, 4, None)
     rows = rng.normal(size=(4, 6)) + rng.normal(size=6)
     gram, way = rows @ rows.T, rows @ rng.normal(size=6)
     costs = []

@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.inference.regression.sensitivities import Number
+from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS, DRIVE_WIDTHS, Number
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.bands import OpenForces
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -30,6 +30,9 @@ from pprs_dynamics.physics.model.keys import set_number
 DIGITS = 6  # significant, of fitted values
 LARGEST_SHAPE_MOVE = 0.5  # of a shape parameter in one fit, as an amount of movement
 SMALL_STEP = 1e-3  # standard deviations, for derivatives by parameters of effects
+# A tolerance is a limit: beyond it a number's prior is this much steeper.
+BEYOND_TOLERANCE = 25.0
+MORE_FRICTION = 0.015 ** -2.0  # precision of friction above the Coulomb level, as a share of it
 MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 
 
@@ -48,17 +51,29 @@ class BaseColumn:
     ----------
     in_model : bool
         Whether a coefficient moves a number of the fitted model; else it is a nuisance.
+    limits : tuple of float
+        Between which that prior holds, below 0 and above.
+    beyond : float
+        What its precision has more beyond them, about the limit.
     """
 
     in_model: ClassVar[bool] = True
+    beyond: ClassVar[float] = 0.0
 
     rows: Mapping[int, Array]
     precision: float
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        return -np.inf, np.inf
 
 
 @dataclass(frozen=True)
 class ModelNumber(BaseColumn):
     """A number within its tolerance; the coefficient counts standard deviations away from 0."""
+
+    limits = -DEVIATIONS, DEVIATIONS
+    beyond = BEYOND_TOLERANCE
 
     number: Number
 
@@ -84,11 +99,19 @@ class LoadOfFriction(FrictionForm):
 class ReversalShape(FrictionForm):
     """Friction that turns over otherwise than the model's; `drive` None: in passive joints.
 
-    `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`.
+    `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`. The
+    coefficient of another width is its share: less than none would be more friction than Coulomb's.
     """
+
+    beyond = MORE_FRICTION
 
     drive: int | None
     number: int
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """From no share of a width on; the even part may have either sign."""
+        return 0.0 if self.number < len(DRIVE_WIDTHS) else -np.inf, np.inf
 
 
 @dataclass(frozen=True)

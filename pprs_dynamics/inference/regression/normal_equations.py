@@ -20,12 +20,10 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.special import log_ndtr
 
 from pprs_dynamics.arrays import Array, Integers
-from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
+from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 
-# A tolerance is a limit: beyond it a number's prior is this many times as steep.
-BEYOND_TOLERANCE = 25.0
-# Rounds until the numbers at their limits are known, and those in which all change at once.
+# Rounds until the coefficients at their limits are known, and those in which all change at once.
 MOST_LIMITED, ALL_AT_ONCE = 200, 8
 
 
@@ -96,7 +94,7 @@ def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
 
 @dataclass(frozen=True)
 class Prior:
-    """The Gaussian prior of all coefficients of a fit, steeper beyond a tolerance.
+    """The Gaussian prior of all coefficients of a fit, steeper beyond limits.
 
     Parameters
     ----------
@@ -104,20 +102,23 @@ class Prior:
     mean : (P,) array
     log_det : float
         Of the precision.
-    limited : (P,) bool array
-        Numbers with a tolerance.
+    limits : (2, P) array
+        From the mean, below 0 and above.
+    beyond : (P,) array
+        What the precision has more beyond them, about the limit.
     """
 
     precision: Array
     mean: Array
     log_det: float
-    limited: np.typing.NDArray[np.bool_]
+    limits: Array
+    beyond: Array
 
     @classmethod
     def of(cls, columns: Sequence[BaseColumn], blocks: Sequence[Block]) -> Prior:
         """Return the prior of base columns, then of blocks in order."""
         first = np.array([column.precision for column in columns])
-        at = len(first)
+        at = at_blocks = len(first)
         count = at + sum(block.size for block in blocks)
         precision, mean = np.zeros((count, count)), np.zeros(count)
         precision[np.arange(at), np.arange(at)] = first
@@ -128,14 +129,15 @@ class Prior:
             if block.mean is not None:
                 mean[place] = block.mean
             at += block.size
-        limited = np.zeros(count, dtype=bool)
-        limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
-        return cls(precision, mean, log_det, limited)
+        limits, beyond = np.multiply.outer((-np.inf, np.inf), np.ones(count)), np.zeros(count)
+        limits[:, :at_blocks] = np.reshape([column.limits for column in columns], (-1, 2)).T
+        beyond[:at_blocks] = [column.beyond for column in columns]
+        return cls(precision, mean, log_det, limits, beyond)
 
     def posterior(self, gram: Array, side: Array) -> Posterior:
         """Return the posterior of coefficients, given X^T S^-1 X and X^T S^-1 y.
 
-        A number beyond its tolerance is held back by a prior that is much steeper there.
+        A coefficient beyond a limit is held back by a prior that is much steeper there.
 
         Parameters
         ----------
@@ -145,55 +147,61 @@ class Prior:
         if not len(side):
             return Posterior(self.mean, gram, 0.0, 0.0)
         b = side - gram @ self.mean
-        beyond = np.zeros(len(b))  # +-1 for numbers beyond their tolerance, else 0
+        lower, upper = self.limits
+        steeper, about = np.zeros(len(b)), np.zeros(len(b))  # than the prior; about which limit
         open_prior = gram + self.precision
         diagonal = np.diag(open_prior) * (1 + 1e-12)  # of Cholesky's factor rounding is as small
         for number in range(MOST_LIMITED):
-            np.einsum('ii->i', open_prior)[:] = diagonal + BEYOND_TOLERANCE * np.abs(beyond)
+            np.einsum('ii->i', open_prior)[:] = diagonal + steeper
             factor, minor = dpotrf(open_prior)
             if minor:
                 raise np.linalg.LinAlgError(f'minor {minor} of the normal equations is negative')
-            away = dpotrs(factor, b + BEYOND_TOLERANCE * DEVIATIONS * beyond)[0]
-            now = np.sign(away) * (self.limited & (np.abs(away) > DEVIATIONS))
-            changed = np.flatnonzero(now != beyond)
+            away = dpotrs(factor, b + steeper * about)[0]
+            within = np.clip(away, lower, upper)
+            now = np.where(away == within, 0.0, self.beyond)
+            changed = np.flatnonzero((now != steeper) | ((now > 0) & (within != about)))
             if not len(changed):
                 break
             # All at once may come back to where they were; one at a time ends (Murty).
             changed = changed if number < ALL_AT_ONCE else changed[:1]
-            beyond[changed] = now[changed]
+            steeper[changed], about[changed] = now[changed], within[changed]
         else:
-            raise np.linalg.LinAlgError('numbers with a tolerance did not settle')
-        upper = dpotri(factor)[0]  # 0 below the diagonal, as the factor is
-        covariance = upper + upper.T
-        np.einsum('ii->i', covariance)[:] = np.einsum('ii->i', upper)
-        penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
-            np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
+            raise np.linalg.LinAlgError('coefficients with limits did not settle')
+        upper_factor = dpotri(factor)[0]  # 0 below the diagonal, as the factor is
+        covariance = upper_factor + upper_factor.T
+        np.einsum('ii->i', covariance)[:] = np.einsum('ii->i', upper_factor)
+        penalty = float(away @ self.precision @ away + steeper @ (away - about) ** 2)
         log_det = 2 * float(np.log(np.einsum('ii->i', factor)).sum())
-        log_det += self._both_sides(away, np.einsum('ii->i', covariance), beyond)
+        log_det += self._both_sides(away, np.einsum('ii->i', covariance), steeper > 0)
         return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
 
-    def _both_sides(self, away: Array, variance: Array, beyond: Array) -> float:
-        """Return the correction of -2 ln of the integral for numbers with a tolerance.
+    def _both_sides(self, away: Array, variance: Array, is_beyond: np.typing.NDArray[np.bool_],
+                    ) -> float:
+        """Return the correction of -2 ln of the integral for coefficients with limits.
 
-        The prior of such a number is one Gaussian within its tolerance and a narrower one beyond,
+        The prior of such a coefficient is one Gaussian within its limits and a narrower one beyond,
         so that its posterior is, too. The determinant is that of the side on which its mode lies,
-        as if it went on there; integrated is over both sides, each with the probability that its
-        own Gaussian has there. Else the cost would have a step where a mode passes a tolerance.
+        as if it went on there; integrated is over both sides of the nearer limit, each with the
+        probability that its own Gaussian has there. Else the cost would have a step where a mode
+        passes a limit.
         """
-        k = np.flatnonzero(self.limited)
-        mode, variance, is_beyond = np.abs(away[k]), variance[k], beyond[k] != 0
-        # Of the number alone, the others as they are: its Gaussian within, and beyond.
-        precise = 1 / variance - BEYOND_TOLERANCE * is_beyond
-        steep = precise + BEYOND_TOLERANCE
-        pulled = mode / variance - BEYOND_TOLERANCE * DEVIATIONS * is_beyond
-        within, outside = pulled / precise, (pulled + BEYOND_TOLERANCE * DEVIATIONS) / steep
+        k = np.flatnonzero(np.isfinite(self.limits).any(axis=0))
+        (lower, upper), more = self.limits[:, k], self.beyond[k]
+        is_above = upper - away[k] < away[k] - lower
+        limit = np.where(is_above, upper, -lower)
+        mode, variance, is_beyond = np.where(is_above, 1, -1) * away[k], variance[k], is_beyond[k]
+        # Of the coefficient alone, the others as they are: its Gaussian within, and beyond.
+        precise = 1 / variance - more * is_beyond
+        steep = precise + more
+        pulled = mode / variance - more * limit * is_beyond
+        within, outside = pulled / precise, (pulled + more * limit) / steep
         # By how much the least of the steep parabola lies above that of the other one.
-        above = BEYOND_TOLERANCE * precise / steep * (within - DEVIATIONS) ** 2
-        inner = log_ndtr((DEVIATIONS - within) * np.sqrt(precise))
-        outer = log_ndtr((outside - DEVIATIONS) * np.sqrt(steep)) - (
+        above = more * precise / steep * (within - limit) ** 2
+        inner = log_ndtr((limit - within) * np.sqrt(precise))
+        outer = log_ndtr((outside - limit) * np.sqrt(steep)) - (
             above + np.log(steep / precise)) / 2
-        more = -2 * np.logaddexp(inner, outer) - is_beyond * (above + np.log(steep / precise))
-        return float(more.sum())
+        total = -2 * np.logaddexp(inner, outer) - is_beyond * (above + np.log(steep / precise))
+        return float(total.sum())
 
 
 @dataclass(frozen=True)
@@ -299,7 +307,7 @@ class NormalEquations:
         lie beyond.
         """
         precision = self.prior.precision * np.where(
-            np.diag(self.prior.limited), 3 / DEVIATIONS ** 2, 1.0)
+            np.diag(np.isfinite(self.prior.limits).all(axis=0)), 3 / DEVIATIONS ** 2, 1.0)
         H = self.weighted(1 / spectra)[0] + precision
         scale = 1 / np.sqrt(np.diag(H))
         covariance: Array = np.linalg.inv(H * np.outer(scale, scale)) * np.outer(scale, scale)

@@ -274,8 +274,10 @@ def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Deci
         fits = first if point is None else first.around(point)
         search = Search(fits, patterns if fits is first else patterns_of(fits), searched)
         search.run(best.fitted.candidates)
-        exact = _with_exact_costs(search, first, exact)
+        exact, before = _with_exact_costs(search, first, exact), best
         best = min(exact.values(), key=lambda row: row.cost)
+        if best is before:
+            break  # the next search would be this one once more
         if search.is_ended and (number or (not best.fitted.is_nonlinear and abs(
                 first.evaluate(best.fitted.candidates).total - best.fitted.total) < LEAST_CHANGE)):
             break
