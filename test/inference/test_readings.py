@@ -144,7 +144,7 @@ def test_motions_as_efforts_are_in_no_unit(arm: DriveModel, seed: int) -> None:
     lag = told(arm, time, q, 0.05 * v + np.random.default_rng(seed).normal(0, 1e-3, q.shape))
     assert 'an error of position' in lag
     for quantity, values in ('position', q), ('velocity', v):
-        assert f'is 1 times the {quantity}, and must be a force' in told(arm, time, q, values)
+        assert f'is the recorded {quantity}, and must be a force' in told(arm, time, q, values)
     assert 'kN' not in lag
 
 

@@ -212,8 +212,8 @@ def find_motion(model: DriveModel, excerpt: Excerpt) -> Iterator[OtherReading]:
         if np.all(apart < table.SAME_MOTION * size) and model.effort_kind not in KINDS:
             yield OtherReading.of(
                 'effort_motion', model.drives, group,
-                f'the effort of {named(model.drives, tuple(group))} is 1 times the {quantity}, and '
-                'must be a force or torque: name its column under columns. Or no effort was '
+                f'the effort of {named(model.drives, tuple(group))} is the recorded {quantity}, '
+                'and must be a force or torque: name its column under columns. Or no effort was '
                 'measured', f'{EFFORT_KIND}: {recorded_names.COMMANDED}')
 
 
