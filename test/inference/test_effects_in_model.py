@@ -160,8 +160,11 @@ def test_adopt_retains_what_the_recording_shows_though_no_single_parameter_is_su
     adoption = adopt(given, EffectRequest(CATALOGUE['stribeck_friction']), [recording])
     assert adoption.adopted
     assert adoption.parameters['axis.force'].value < 2 * adoption.parameters['axis.force'].std
-    assert adoption.after.values['effects.stribeck_friction.axis.force'] == pytest.approx(
-        1.2, rel=0.2)
+    force, width, exponent = (adoption.after.values[f'effects.stribeck_friction.axis.{name}']
+                              for name in ('force', 'velocity', 'exponent'))
+    for speed in (0.01, 0.015):  # at which it is measured
+        assert force * np.exp(-(speed / width) ** exponent) == pytest.approx(
+            1.2 * np.exp(-(speed / 0.01) ** 2), rel=0.1)
     assert not any('removed' in remark for remark in adoption.remarks)
 
 
