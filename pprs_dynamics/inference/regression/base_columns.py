@@ -51,10 +51,8 @@ class BaseColumn:
     ----------
     in_model : bool
         Whether a coefficient moves a number of the fitted model; else it is a nuisance.
-    limits : tuple of float
-        Between which that prior holds, below 0 and above.
     beyond : float
-        What its precision has more beyond them, about the limit.
+        What the precision has more beyond a limit, about it.
     """
 
     in_model: ClassVar[bool] = True
@@ -65,6 +63,7 @@ class BaseColumn:
 
     @property
     def limits(self) -> tuple[float, float]:
+        """Coefficients between which that prior holds."""
         return -np.inf, np.inf
 
 
