@@ -143,9 +143,9 @@ def test_an_uncertainty_is_that_of_all_near_sets_with_the_effect() -> None:
     found = next(e for e in answer.effects if e.name == 'viscous_friction').parameters[key]
     values, weights = [], []
     for cost, fitted in [(0.0, table.reported), *table.near(MARGIN)]:
-        friction = next(c for c in fitted.effects if c.name == 'viscous_friction')
-        values.append(estimate(table.last, fitted, friction).parameters[key])
-        weights.append(np.exp(-cost / 2))
+        for friction in (c for c in fitted.effects if c.name == 'viscous_friction'):
+            values.append(estimate(table.last, fitted, friction).parameters[key])
+            weights.append(np.exp(-cost / 2))
     assert len(values) > 2
     squares = [v.std ** 2 + (v.value - found.value) ** 2 for v in values]
     assert found.std ** 2 == pytest.approx(np.average(squares, weights=weights), rel=1e-3)
