@@ -90,7 +90,8 @@ def test_adopt_refuses_an_error_that_does_not_fall_however_sure_the_gain_is() ->
     several = replace(case, is_alone=False)
     assert several.objections(sure, (1.0, 1.2), 'the recordings', 'N') == ()
     said, = several.objections(unsure, (1.0, 1.2), 'the recordings', 'N')
-    assert said.endswith('falls by 0.5 standard errors, and at least 2 must be reached')
+    assert said.endswith(
+        'falls by 0.5 standard errors; it must fall by at least 2 and rise on no drive')
     assert case.objections(unsure, (1.0, 0.9), 'the recordings', 'N') == (said,)
 
 

@@ -186,9 +186,11 @@ class _Case:
             return ()
         if gain is None or not does_fall:
             return (f'the error on {where} {change(errors[0], errors[1], unit)}',)
-        rises = f' rises on {listed(gain.losing)} and' if gain.losing else ''
-        return (f'the error on {where}{rises}, weighted by the noise, falls by '
-                f'{gain.certainty:.2g} standard errors, and at least {SURE:g} must be reached',)
+        changes, worse = 'falls' if gain.certainty > 0 else 'rises', (
+            f' and rises on {listed(gain.losing)}' if gain.losing else '')
+        return (f'the error on {where}, weighted by the noise, {changes} by '
+                f'{abs(gain.certainty):.2g} standard errors{worse}; it must fall by at least '
+                f'{SURE:g} and rise on no drive',)
 
     def adoption(self, request: EffectRequest, after: DriveModel, held_out: tuple[float, float],
                  gain: PredictiveGain | None, objections: Sequence[str], **details: Any,
