@@ -71,16 +71,13 @@ def run(folder: Path) -> None:
         Path('psm.yaml').write_text(model_text())
     if not Path('base.yaml').exists():
         main(['fit', FREE, '--model', 'psm.yaml', '--output', 'base.yaml'])
-    if not Path('full.yaml').exists():
-        main(['diagnose', FREE, '--model', 'base.yaml', '--adopt-all',
-              '--output', 'full.yaml'])
     for name in LOADED:
         if not Path(f'{name}.json').exists():
-            main(['diagnose', f'{name}.csv.gz', '--model', 'full.yaml', '--as-it-is',
-                  '--json', f'{name}.json'])
+            main(['diagnose', f'{name}.csv.gz', '--model', 'base.yaml', '--reference',
+                  '--as-it-is', '--json', f'{name}.json'])
     free = read_recording(FREE, DriveModel.load('psm.yaml').recorded)
     lines = [f'| model | {" | ".join(free.drives)} |', '|---|---|---|---|']
-    for name in ('psm', 'base', 'full'):
+    for name in ('psm', 'base'):
         errors = share(relative_below(DriveModel.load(f'{name}.yaml'), [free]))
         lines.append(f'| {name} | ' + ' | '.join(f'{100 * error:.1f} %' for error in errors) + ' |')
     lines += ['', '| recording | verdict | effect | alike | parameters |', '|---|---|---|---|---|']
@@ -88,19 +85,20 @@ def run(folder: Path) -> None:
         answer = json.loads(Path(f'{name}.json').read_text())
         for effect in answer['effects']:
             values = ', '.join(f'{key} {value["value"]:.3g}'
-                               for key, value in effect['parameters'].items())
-            lines.append(f'| {name} | {answer["verdict"]} | {effect["name"]} | '
-                         f'{", ".join(effect["alike"] or ())} | {values} |')
+                               for key, value in effect['parameters'].items() if value['value'])
+            alike = '; '.join(map(', '.join, effect['alike']))
+            lines.append(f'| {name} | {answer["verdict"]} | {effect["name"]} | {alike} | '
+                         f'{values} |')
     draw()
     write_results('davinci', 'A surgical arm with two parallelograms',
                   'python -m benchmarks.real.davinci FOLDER',
                   'Relative errors of effort below 6 Hz on the free run, then the diagnoses of '
-                  'runs with a weight of 105 g.\n\n' + '\n'.join(lines))
+                  'runs with a weight of 105 g since that run.\n\n' + '\n'.join(lines))
 
 
 def draw() -> None:
     """Draw the error of pitch with the weight on top, before and with the body found."""
-    model = DriveModel.load('full.yaml')
+    model = DriveModel.load('base.yaml')
     name = LOADED[0]
     said = json.loads(Path(f'{name}.json').read_text())['effects'][0]
     values = {f'effects.{said["name"]}.{key}': number['value']
