@@ -32,7 +32,7 @@ LARGEST_SHAPE_MOVE = 0.5  # of a shape parameter in one fit, as an amount of mov
 SMALL_STEP = 1e-3  # standard deviations, for derivatives by parameters of effects
 # A tolerance is a limit: beyond it a number's prior is this much steeper.
 BEYOND_TOLERANCE = 25.0
-MORE_FRICTION = 0.015 ** -2.0  # precision of friction above the Coulomb level, as a share of it
+OWN_FORM = 0.015  # form error of the model's friction over its force, see `decisions`
 MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 
 
@@ -99,10 +99,11 @@ class ReversalShape(FrictionForm):
     """Friction that turns over otherwise than the model's; `drive` None: in passive joints.
 
     `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`. The
-    coefficient of another width is its share: less than none would be more friction than Coulomb's.
+    coefficient of another width is its share: less than none would be more friction than Coulomb's,
+    which is there within the form error.
     """
 
-    beyond = MORE_FRICTION
+    beyond = OWN_FORM ** -2.0
 
     drive: int | None
     number: int

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
+from pprs_dynamics.inference.regression.base_columns import OWN_FORM
+
 Decider = TypeVar('Decider', bound=Callable[..., object])
 OUTSIDE_COST: dict[str, str] = {}
 """What changes an answer other than the cost: name of the function, and the rule."""
@@ -49,7 +51,7 @@ class Decisions:
     form_share: float = 0.15
     # Form error of the input model's friction as a share of its force. Load-dependent friction is
     # computed from frictionless loads, 1 to 2 % off.
-    own_form_share: float = 0.015
+    own_form_share: float = OWN_FORM
     # Share that 99 of 100 form errors do not exceed. Of four shapes (`form_error.SHAPES`), by chi
     # squared, it is 1.82 times the root of the mean square.
     most_form_share: float = 0.273
