@@ -9,12 +9,13 @@ r"""Prediction of the repeatable error of a recording from reference runs, with 
     y_l = X_l \theta + \rho\,\delta(s_l) + \sqrt{1 - \rho^2}\,\delta'(s_l) + n_l
 
 y are the errors of the model, theta the numbers of its base, and delta the repeatable error. Delta
-is in each drive the sum of two Gaussian processes, over the states of all drives,
-s = (q / l_q, tanh(v / v_0) / l_v), and over its own. Waves over its own position are added, as
-gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta + delta(s_l) is
-Gaussian: its mean is carried over, and the principal directions of its covariance are columns of
-unit prior. Near the states of the reference the errors of the base cancel. Far from them the prior
-decides.
+is in each drive the sum of three Gaussian processes. Two are over the states of all drives,
+s = (q / l_q, tanh(v / v_0) / l_v), and over its own. The third is over how far it has slid since a
+reversal, s = (z / l_v, tanh(v / v_0) / l_v), with Dahl's state z. Waves over its own position are
+added, as gears and motors have them. delta' is drawn anew for every run. Given y_r,
+X_l theta + delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its
+covariance are columns of unit prior. Near the states of the reference the errors of the base
+cancel. Far from them the prior decides.
 
 A process is a finite sum, Phi(s) w, over states that a pivoted Cholesky factor of its kernel
 chooses. States of a recording that these do not reach get features of their own. Waves are finer
@@ -51,6 +52,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.laws.hysteresis import presliding
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Over which forces are alike, in standard deviations of the positions and in turns of the
@@ -68,6 +70,9 @@ MOST_DIRECTIONS = 24  # that become columns of all drives together
 MOST_STATES, MOST_OWN, MOST_NEW = 100, 40, 50
 LEAST_VARIANCE = 0.05  # of the kernel, that a further state must bring
 SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
+# Of the spread of positions, the way after a reversal in which friction is told apart: from some
+# hundredths of a millimetre to some millimetres.
+SLIDING = 0.03
 # Waves of a drive: at most; from and to how many over the whole stroke; and how often the variance
 # of the residual sine and cosine explain: by chance one in 25 000 that are tried does.
 MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
@@ -98,12 +103,18 @@ class States:
         return cls(q.mean(axis=0), np.maximum(q.std(axis=0), 1e-9),
                    np.maximum(SLOW * np.sqrt((v ** 2).mean(axis=0)), 1e-9))
 
-    def at(self, q: Array, v: Array, drive: int | None = None) -> Array:
-        """Return the states of all drives in a motion (M, D), or of one, (M, k)."""
-        position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
+    def at(self, q: Array, v: Array, drive: int | None = None, slides: bool = False) -> Array:
+        """Return the states of all drives in a motion (M, D), or of one, (M, k).
+
+        Or of one how far it has slid since a reversal, in the place of its position.
+        """
         chosen = slice(None) if drive is None else [drive]
-        return np.concatenate((position[:, chosen] / self.lengths[0],
-                               direction[:, chosen] / self.lengths[1]), axis=1)
+        direction = np.tanh(v / self.speed)[:, chosen] / self.lengths[1]
+        if slides and drive is not None:
+            slid = presliding(q[:, drive], SLIDING * float(self.spread[drive]))[:, None]
+            return np.concatenate((slid / self.lengths[1], direction), axis=1)
+        position = ((q - self.centre) / self.spread)[:, chosen] / self.lengths[0]
+        return np.concatenate((position, direction), axis=1)
 
 
 def motion_of(residuals: Residuals) -> tuple[Array, Array]:
@@ -159,32 +170,35 @@ class Process:
         States that it is conditioned on.
     root : (R, R) array
         Lower factor of their kernel.
+    slides : bool
+        Whether over how far the drive has slid, see `States.at`.
     """
 
     drive: int | None
     states: States
     chosen: Array
     root: Array
+    slides: bool = False
 
     @classmethod
     def of(cls, residuals: Residuals, states: States, drive: int | None = None,
-           ) -> tuple[Process, Array]:
+           slides: bool = False) -> tuple[Process, Array]:
         """Return the process of a recording, and its features there, (M, R)."""
-        at = states.at(*motion_of(residuals), drive)
+        at = states.at(*motion_of(residuals), drive, slides)
         rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
-        return cls(drive, states, at[rows], factor[rows]), factor
+        return cls(drive, states, at[rows], factor[rows], slides), factor
 
     def known(self, q: Array, v: Array, _: float) -> Array:
         """Return the features of the process in a motion, (M, R); see `Waves.known`."""
         from scipy.linalg import solve_triangular  # here: commands start without it
 
-        at = self.states.at(q, v, self.drive)
+        at = self.states.at(q, v, self.drive, self.slides)
         known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
         return known
 
     def new(self, q: Array, v: Array, known: Array) -> Array:
         """Return features of states that it does not know, (M, r), orthogonal to the known ones."""
-        return factor_of(self.states.at(q, v, self.drive), MOST_NEW, known)[1]
+        return factor_of(self.states.at(q, v, self.drive, self.slides), MOST_NEW, known)[1]
 
 
 @dataclass(frozen=True)
@@ -251,7 +265,7 @@ class Waves:
 
 
 Processes = tuple[tuple[Process | Waves, ...], ...]
-"""Of each drive the process over all drives, that over its own state, and its waves."""
+"""Of each drive the process over all, those over its own state and its sliding, and its waves."""
 
 
 class ReferenceRunError(PprsError, ValueError):
@@ -267,7 +281,7 @@ class Reference:
     model : DriveModel
     recordings : tuple of Recording
     processes : Processes
-    size : (D, 3) array
+    size : (D, 4) array
         Standard deviations of a drive's processes [N].
     repeats : (D,) array
         Correlation of the processes in two runs.
@@ -503,16 +517,18 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int]) ->
     """
     plain, drives = States.of(residuals), range(len(residuals.drives))
     shared, features = Process.of(residuals, replace(plain, lengths=LENGTHS))
-    own = [Process.of(residuals, replace(plain, lengths=OWN_LENGTHS), d) for d in drives]
-    found = []
+    own = [[Process.of(residuals, replace(plain, lengths=OWN_LENGTHS), d, slides)
+            for slides in (False, True)] for d in drives]
+    found: list[tuple[Process | Waves, ...]] = []
     for d in drives:
         rest = residuals.error[:, d]
         if d in measured:
-            fit = _sized(residuals, columns, d, (features, own[d][1]))[1]
-            rest = rest - np.concatenate(
-                (columns[:, d], features, own[d][1]), axis=1) @ fit.coefficients
+            known = [features, *(of_own for _, of_own in own[d])]
+            fit = _sized(residuals, columns, d, known)[1]
+            rest = rest - np.concatenate((columns[:, d], *known), axis=1) @ fit.coefficients
             rest = rest - np.nanmean(rest)
-        found.append((shared, own[d][0], Waves.of(residuals, d, rest)))
+        found.append((shared, *(process for process, _ in own[d]),
+                      Waves.of(residuals, d, rest)))
     return tuple(found)
 
 
