@@ -186,8 +186,8 @@ class _Case:
             return ()
         if gain is None or not does_fall:
             return (f'the error on {where} {change(errors[0], errors[1], unit)}',)
-        changes, worse = 'falls' if gain.certainty > 0 else 'rises', (
-            f' and rises on {listed(gain.losing)}' if gain.losing else '')
+        changes = 'falls' if gain.certainty > 0 else 'rises'
+        worse = f' and rises on {listed(gain.losing)}' if gain.losing else ''
         return (f'the error on {where}, weighted by the noise, {changes} by '
                 f'{abs(gain.certainty):.2g} standard errors{worse}; it must fall by at least '
                 f'{SURE:g} and rise on no drive',)

@@ -21,7 +21,6 @@ from scipy.special import log_ndtr
 
 from pprs_dynamics.arrays import Array, Integers
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
-from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 
 # Rounds until the coefficients at their limits are known, and those in which all change at once.
 MOST_LIMITED, ALL_AT_ONCE = 200, 8
@@ -118,7 +117,7 @@ class Prior:
     def of(cls, columns: Sequence[BaseColumn], blocks: Sequence[Block]) -> Prior:
         """Return the prior of base columns, then of blocks in order."""
         first = np.array([column.precision for column in columns])
-        at = at_blocks = len(first)
+        at = len(first)
         count = at + sum(block.size for block in blocks)
         precision, mean = np.zeros((count, count)), np.zeros(count)
         precision[np.arange(at), np.arange(at)] = first
@@ -129,9 +128,9 @@ class Prior:
             if block.mean is not None:
                 mean[place] = block.mean
             at += block.size
-        limits, beyond = np.multiply.outer((-np.inf, np.inf), np.ones(count)), np.zeros(count)
-        limits[:, :at_blocks] = np.reshape([column.limits for column in columns], (-1, 2)).T
-        beyond[:at_blocks] = [column.beyond for column in columns]
+        limits, beyond = np.repeat([[-np.inf], [np.inf]], count, axis=1), np.zeros(count)
+        for k, column in enumerate(columns):
+            limits[:, k], beyond[k] = column.limits, column.beyond
         return cls(precision, mean, log_det, limits, beyond)
 
     def posterior(self, gram: Array, side: Array) -> Posterior:
@@ -306,8 +305,9 @@ class NormalEquations:
         to the Expression of Uncertainty in Measurement, 4.3.7). The fit takes less, so that few
         lie beyond.
         """
-        precision = self.prior.precision * np.where(
-            np.diag(np.isfinite(self.prior.limits).all(axis=0)), 3 / DEVIATIONS ** 2, 1.0)
+        limits, precision = self.prior.limits, self.prior.precision.copy()
+        k = np.flatnonzero(np.isfinite(limits).all(axis=0))
+        precision[k, k] *= 3 / limits[1, k] ** 2
         H = self.weighted(1 / spectra)[0] + precision
         scale = 1 / np.sqrt(np.diag(H))
         covariance: Array = np.linalg.inv(H * np.outer(scale, scale)) * np.outer(scale, scale)
