@@ -115,7 +115,7 @@ def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> St
     report('diagnosing')
     diagnosis = diagnose(model, [run])
     report('adopting asymmetric_friction')
-    asymmetric = adopt(model, EffectRequest.of('asymmetric_friction'), [run], force=True,
+    asymmetric = adopt(model, EffectRequest.of('asymmetric_friction', model), [run], force=True,
                        diagnosis=diagnosis)
     report('the whole loop, gated by blocks')
     blind = adopt_all(model, [run], diagnosis=diagnosis)
@@ -123,7 +123,7 @@ def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> St
     gated = adopt_all(model, [run], [pulses], diagnosis=diagnosis)
     report('offering a screw ripple')
     try:
-        ripple = adopt(gated.model, EffectRequest.of('force_ripple'), [run], [pulses])
+        ripple = adopt(gated.model, EffectRequest.of('force_ripple', gated.model), [run], [pulses])
     except PprsError as error:
         report(str(error))
         ripple = None

@@ -159,7 +159,7 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
     if start is None:
         return None
     robot, old, question = start.robot, start.recording, start.question
-    motions = Motions(robot.model, NEW, 4 * question.noise_floor)
+    motions = Motions(robot.model, NEW, 4 * question.information.noise_floor)
     cpu, wall = time.process_time(), time.perf_counter()
     experiment = design_experiment(question, motions, seed)
     cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}

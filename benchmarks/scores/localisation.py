@@ -165,7 +165,7 @@ def states_anything(kind: float | str, seed: int) -> str:
     recording = record_motion(seed)
     rng = np.random.default_rng((seed, 1))
     noisy = recording.measured + NOISE * make_noise(kind, len(recording), rng)
-    found = localise(replace(recording, measured=noisy)).statements
+    found = localise(replace(recording, measured=noisy))[0]
     return f'[{found[0].evidence:.0f}] {found[0].text}' if found else ''
 
 
@@ -177,7 +177,7 @@ def misses(name: str, kind: float | str, seed: int) -> str:
     variable, shape = PLANTS[name](recording, drive, rng)
     noisy = recording.measured + NOISE * make_noise(kind, len(recording), rng)
     noisy[:, drive] += ERROR * shape
-    found = localise(replace(recording, measured=noisy)).statements
+    found = localise(replace(recording, measured=noisy))[0]
     if not found:
         return 'nothing said'
     right = (found[0].drive, found[0].variable) == (DRIVES[drive], variable)

@@ -109,7 +109,7 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
 
 def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
     model = DriveModel.load(files.model)
-    return adopt(model, EffectRequest.of(text, model.drives), files.recordings[:1], validation,
+    return adopt(model, EffectRequest.of(text, model), files.recordings[:1], validation,
                  diagnosis=files.diagnosis, **options)
 
 
@@ -156,7 +156,7 @@ def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Reco
 def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
     model, recording = synthetic({}, **{
         'effects.active': [HIDDEN], f'effects.{HIDDEN}.slide_1.force': 0.4})
-    answer = adopt(model, EffectRequest.of(f'{HIDDEN}:lift_2'), [recording])
+    answer = adopt(model, EffectRequest.of(f'{HIDDEN}:lift_2', model), [recording])
     assert not answer.adopted
     assert f'the recordings show {HIDDEN} on slide_1, not on lift_2' in answer.reason
 
@@ -168,12 +168,12 @@ LESS = {f'effects.load_friction.lift_{k}.coefficient': -0.1 for k in (1, 2, 3)}
 def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     hidden = {'effects.active': ['load_friction'], **LESS}
     model, recording = synthetic({}, **hidden)
-    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
+    answer = adopt(model, EffectRequest.of('load_friction', model), [recording])
     assert not answer.adopted
     assert 'more is taken away than the model has' in answer.reason
     rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
     model, recording = synthetic(rough, **rough, **hidden)
-    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
+    answer = adopt(model, EffectRequest.of('load_friction', model), [recording])
     assert answer.adopted, answer.reason
     assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
 
@@ -184,7 +184,7 @@ def test_held_out_errors_are_those_with_the_added_effect_alone(name: str, other:
     """The new model lacks the other effect, whose force decides neither for nor against it."""
     model, robot = axis(), axis({'viscous_friction': {'coefficient': 30.0},
                                  'drive_spring': {'stiffness': 80.0, 'position': 0.0}})
-    answer = adopt(model, EffectRequest.of(name, model.drives), [axis_recording(robot)])
+    answer = adopt(model, EffectRequest.of(name, model), [axis_recording(robot)])
     assert answer.adopted, answer.reason
     assert other in ' '.join(answer.remarks)
     assert answer.held_out_before == pytest.approx(answer.error_before, rel=0.1)
@@ -209,6 +209,6 @@ def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence() -> None:
     found = diagnose(model, [recording])
     for text, named in (('coulomb_friction:slide_1,lift_1', 'slide_1'),
                         ('viscous_friction:slide_2', 'slide_2')):
-        answer = adopt(model, EffectRequest.of(text), [recording], diagnosis=found)
+        answer = adopt(model, EffectRequest.of(text, model), [recording], diagnosis=found)
         assert not answer.adopted
         assert f'{named} hardly moved in the recordings' in answer.reason

@@ -17,7 +17,7 @@ from planar_arm import planar_arm
 from pprs_dynamics import JointMotion
 from pprs_dynamics.app.api.adopt import parameter_rows
 from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.body_centres import find_centre
@@ -53,7 +53,7 @@ def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_pa
     assert [effect.name for effect in found.effects] == ['payload_mass']
     said = found.effects[0].parameters
     assert abs(said['mass'].value * said['z'].value + 0.25) < 0.01
-    adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
+    adoption = adopt(model, EffectRequest.of('payload_mass', model), [recording], diagnosis=found)
     assert adoption.adopted, adoption.reason
     assert adoption.held_out_after < 1.1 * NOISE
 
@@ -65,7 +65,7 @@ def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Pat
     # At rest a weight on a joint and a spring on a lever hold alike.
     found = diagnose(model, [recording])
     assert {'payload_mass', 'counterbalance'} in map(set, found.indistinguishable)
-    adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
+    adoption = adopt(model, EffectRequest.of('payload_mass', model), [recording], diagnosis=found)
     assert adoption.adopted, adoption.reason
     mass, moment = adoption.parameters['mass'], adoption.moments['moment_z']
     assert mass.std > 0.1 * mass.value
@@ -76,7 +76,7 @@ def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Pat
     assert 'moment_z -0.2' in values
     assert values.endswith('kg m')
     # Where the mass is as sure, mass and centre say it.
-    quick = adopt(model, requested('payload_mass', model), [record(adoption.after)])
+    quick = adopt(model, EffectRequest.of('payload_mass', model), [record(adoption.after)])
     assert 'moment_z' not in dict(parameter_rows(quick))['payload_mass']
 
 
@@ -90,7 +90,7 @@ def test_the_interval_of_a_mass_has_every_centre_that_the_path_allows(tmp_path: 
     file.write_text(file.read_text().replace('tool: rod_1', 'tool: flange'))
     model = DriveModel.load(file)
     recording = record(with_effects(model, {'payload_mass': {'mass': 0.48, 'z': 0.35}}), pace=0.1)
-    adoption = adopt(model, requested('payload_mass', model), [recording])
+    adoption = adopt(model, EffectRequest.of('payload_mass', model), [recording])
     assert adoption.adopted, adoption.reason
     mass = adoption.parameters['mass']
     assert abs(mass.value - 0.48) < 2 * mass.std

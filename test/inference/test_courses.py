@@ -55,7 +55,7 @@ def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment() -> N
 @pytest.mark.slow
 def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
     recording = recorded(np.where((TIME > 4.0)[:, None], loaded(0.2), FORCES.total))
-    answer = adopt(MODEL, EffectRequest.of('payload_mass').placed(MODEL), [recording])
+    answer = adopt(MODEL, EffectRequest.of('payload_mass', MODEL), [recording])
     assert not answer.adopted
     assert 'it is there since 4' in answer.reason
 

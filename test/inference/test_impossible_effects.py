@@ -130,7 +130,7 @@ def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     assert alone.coefficients(component) == pytest.approx([0.5])
     assert alone.terms.feasibility > DECISIONS.rival_margin
     assert fits.refused(alone) == [component]
-    answer = adopt(loose, EffectRequest.of('effort_gain'), [doubled], diagnosis=found)
+    answer = adopt(loose, EffectRequest.of('effort_gain', loose), [doubled], diagnosis=found)
     assert not answer.adopted
     assert 'values of effort_gain that fit best are impossible' in answer.reason
 

@@ -73,7 +73,7 @@ def test_a_robot_that_stands_is_not_diagnosed() -> None:
     with pytest.raises(MotionError, match='no drive moves'):
         diagnose(model, [standing])
     live = LiveDiagnosis(model).with_window(standing, 0.0)
-    assert live.last is None
+    assert live.latest == {}
     assert 'hardly moves' in live.note
 
 

@@ -17,7 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.fit_curve import without_curve
-from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.measured_curve import spline_basis
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -74,7 +74,8 @@ def test_the_error_falls_to_the_noise_along_another_motion(
     model: DriveModel, hidden: Callable[[Array], Array], variable: str, tmp_path: Path,
 ) -> None:
     run, other = (recorded(model, seed, hidden) for seed in (1, 2))
-    answer = adopt(model, requested(f'measured_curve:lift_1@{variable}', model), [run], [other])
+    answer = adopt(
+        model, EffectRequest.of(f'measured_curve:lift_1@{variable}', model), [run], [other])
     assert answer.adopted, answer.reason
     assert answer.held_out_after < 1.1 * answer.noise_floor < 0.5 * answer.held_out_before
     assert answer.to_dict()['effect'] == f'measured_curve:lift_1@{variable}'
@@ -94,7 +95,7 @@ def test_the_error_falls_to_the_noise_along_another_motion(
 def test_where_nothing_is_missing_it_is_refused(model: DriveModel) -> None:
     run, other = (recorded(model, seed, lambda position: np.zeros(len(position)))
                   for seed in (1, 2))
-    answer = adopt(model, requested('measured_curve:lift_1@position', model), [run], [other])
+    answer = adopt(model, EffectRequest.of('measured_curve:lift_1@position', model), [run], [other])
     assert not answer.adopted
     assert 'evidence' in answer.reason
     assert answer.error_after == pytest.approx(answer.error_before, rel=0.02)

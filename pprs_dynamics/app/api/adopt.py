@@ -31,7 +31,7 @@ from pprs_dynamics.inference.adoption.adopt import AMBIGUOUS, REFUSED, AdoptionR
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
 from pprs_dynamics.inference.adoption.adopt import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
-from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.quantities import (
     in_unit,
     measured,
@@ -303,7 +303,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     """
     inputs = Inputs.of(
         model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
-    request = requested(effect, inputs.model)
+    request = EffectRequest.of(effect, inputs.model)
     inputs = inputs.since(reference, original(inputs.model))
     return AdoptionResult(inputs, adopt_effect(
         inputs.model, request, inputs.fitted, inputs.held_out, force,

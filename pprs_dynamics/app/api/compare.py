@@ -128,7 +128,7 @@ class ComparisonResult(Result):
                 else:
                     page.text(NOWHERE)
             if statements:
-                noise = comparison.localisation.noise.get(statements[0].drive)
+                noise = comparison.noise.get(statements[0].drive)
                 picture = noise and figures.along(residuals, noise, statements[0], 'error')
                 if picture is not None:
                     page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '

@@ -13,7 +13,7 @@ import argparse
 from pprs_dynamics.app.api.adopt import adopt
 from pprs_dynamics.app.commands.arguments import add_shared, answer, show
 from pprs_dynamics.app.report.terminal import shown
-from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     # What does not exist is said before recordings are read.
-    requested(options.effect, DriveModel.load(find_file(options.model)))
+    EffectRequest.of(options.effect, DriveModel.load(find_file(options.model)))
     screen, result = answer(adopt, options, effect=options.effect, force=options.force,
                             reference=options.reference)
     if result.adopted:

@@ -23,7 +23,7 @@ from pprs_dynamics import __version__
 from pprs_dynamics.app.fleet.recordings import AUTO, MODEL, SurveyedRecording
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.comparison import Localisation, compare
+from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -87,7 +87,7 @@ def key(common: Mapping[str, Any]) -> str:
 
 def requests_of(options: str, model: DriveModel) -> tuple[EffectRequest, ...]:
     """Return the effects that options name, as EFFECT or EFFECT:drive+drive; errors as theirs."""
-    return tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives)).placed(model)
+    return tuple(EffectRequest.of(text.strip().replace('+', ','), model)
                  for text in options.split(',') if text.strip())
 
 
@@ -156,7 +156,7 @@ def _refuse_mistakes(model: DriveModel, recording: Recording, job: SurveyJob) ->
 
 def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, Any]]:
     """Return rms, relative error and noise of every drive that was measured."""
-    compared = compare(residuals, Localisation((), {}), noise)
+    compared = compare(residuals, ((), {}), noise)
     return {name: {'rms': drive.rms, 'relative': drive.relative, 'noise': drive.noise_floor}
             for name, drive in compared.drives.items()}
 

@@ -259,7 +259,7 @@ def against_variables(residuals: Residuals, comparison: Comparison) -> list[tupl
             continue
         traces = []
         for drive, drive_name in enumerate(residuals.drives):
-            noise = comparison.localisation.noise.get(drive_name)
+            noise = comparison.noise.get(drive_name)
             profile = None if noise is None else error_profile(residuals, drive, name, noise)
             if profile is not None:
                 traces.append(_means(profile, name, residuals, drive_name, {'drive': drive_name}))
@@ -390,7 +390,7 @@ def axis_of(variable: str, residuals: Residuals, drive: str = '') -> tuple[float
 
 def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
     """Return the spectra of error and noise of each drive."""
-    noises = {name: comparison.localisation.noise.get(name) for name in residuals.drives}
+    noises = {name: comparison.noise.get(name) for name in residuals.drives}
     return _over_frequency([trace for name, noise in noises.items() if noise is not None
                             for trace in _spectra(residuals, name, noise)], 360,
                            f'power [{_power(residuals.unit)}]')

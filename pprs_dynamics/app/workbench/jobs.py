@@ -176,8 +176,7 @@ class Jobs:
             ticks.require(revision)
             tick, fits = ticks.view.ticks.get(effect), ticks.fits
             request = EffectRequest.named(
-                effect, fits.design.named(tick.best.drives) if tick else None,
-                fits.drives).placed(ticks.model)
+                effect, fits.design.named(tick.best.drives) if tick else None, ticks.model)
             last = self.of_kind.get('adopt')
             if last is not None and last.is_running:
                 raise SessionError(f'{last.what} is being adopted, must end first')

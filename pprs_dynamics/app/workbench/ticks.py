@@ -98,8 +98,7 @@ class Ticks:
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):
                     self._tick(EffectRequest.named(
-                        name, fits.design.named(tick.best.drives), fits.drives).placed(
-                            fits.model), tick.chosen)
+                        name, fits.design.named(tick.best.drives), fits.model), tick.chosen)
             self.notify()
 
     def change_recordings(self, change: Callable[[Inputs], Inputs]) -> None:
@@ -160,7 +159,7 @@ class Ticks:
         StaleError
             Where the session is at another revision.
         """
-        request = EffectRequest.named(effect, drives, self.fits.drives).placed(self.model)
+        request = EffectRequest.named(effect, drives, self.model)
         on = f' on {", ".join(drives)}' if drives else ''
         with self.changing(revision, f'{effect} ticked{on}'):
             return self._tick(request)

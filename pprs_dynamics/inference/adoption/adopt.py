@@ -104,7 +104,6 @@ def adopt(
         raise EffectRequestError(f'{request.name}: a curve contains the error of the reference, '
                                  'too; since a reference, request an effect')
     start = model if request.variable else original(model)
-    request = request.placed(start)
     if diagnosis is None or not (diagnosis.selection or request.variable):
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSED * share),
                              reference=reference)

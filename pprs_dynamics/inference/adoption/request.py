@@ -6,9 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError, UnknownNameError, suggestion
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -39,67 +38,49 @@ class EffectRequest:
     variable: str = ''
 
     @classmethod
-    def of(cls, text: str, known: tuple[str, ...] = DRIVES) -> EffectRequest:
-        """Read a request for the drives that are known.
+    def of(cls, text: str, model: DriveModel) -> EffectRequest:
+        """Read a request for a model.
 
         Raises
         ------
         EffectRequestError
-            For an effect or a drive that does not exist.
+            For an effect or a drive that does not exist, or does not act there.
         """
         name, colon, listed = text.partition(':')
         if name == MeasuredCurve.name:
             drive, at, variable = listed.partition('@')
             if not at:
                 raise EffectRequestError(f'{text} must be measured_curve:DRIVE@VARIABLE, e.g. '
-                                         f'measured_curve:{known[0]}@position')
-            if drive not in known:
-                raise UnknownNameError('drive', drive, known, name)
-            return cls(MeasuredCurve, (drive,), check_variable(name, variable, known))
+                                         f'measured_curve:{model.drives[0]}@position')
+            if drive not in model.drives:
+                raise UnknownNameError('drive', drive, model.drives, name)
+            return cls(MeasuredCurve, (drive,), check_variable(name, variable, model.drives))
         return cls.named(name, [drive.strip() for drive in listed.split(',')] if colon else None,
-                         known)
+                         model)
 
     @classmethod
-    def named(cls, name: str, on: Iterable[str] | None = None, known: tuple[str, ...] = DRIVES,
-              ) -> EffectRequest:
-        """Return the request of an effect by name, on some of the drives that are known.
+    def named(cls, name: str, on: Iterable[str] | None, model: DriveModel) -> EffectRequest:
+        """Return the request of an effect by name, on some of a model's drives; errors as `of`.
 
-        Raises
-        ------
-        EffectRequestError
-            For an effect or a drive that does not exist.
+        The effect has the joints and links that the model has.
         """
         effect = find_effect(name)
         if effect is None:
             raise EffectRequestError(f'unknown effect {name!r}{suggestion(name, catalogue())}, '
                                      f'must be one of {", ".join(catalogue())}')
-        if on is None:
-            return cls(effect)
-        drives = tuple(dict.fromkeys(on))
-        if not issubclass(effect, DriveEffect):
+        drives = None if on is None else tuple(dict.fromkeys(on))
+        if drives is not None and not issubclass(effect, DriveEffect):
             raise EffectRequestError(f'{name} is in the structure and must be requested '
                                      f'without {", ".join(drives) or "drives"}')
-        for drive in drives:
-            if drive not in known:
-                raise EffectRequestError(f'unknown drive {drive!r}{suggestion(drive, known)}, '
-                                         f'must be one of {", ".join(known)}')
-        return cls(effect, tuple(sorted(drives, key=known.index)))
-
-    def placed(self, model: DriveModel) -> EffectRequest:
-        """Return the request of the effect with the joints and links of what a model is of.
-
-        Raises
-        ------
-        EffectRequestError
-            Where it cannot act there.
-        """
-        if self.variable:
-            return self
-        if not model.offers(self.effect):
+        for drive in drives or ():
+            if drive not in model.drives:
+                raise EffectRequestError(f'unknown drive {drive!r}{suggestion(drive, model.drives)}'
+                                         f', must be one of {", ".join(model.drives)}')
+        if not model.offers(effect):
             offered = [name for name, effect in catalogue().items() if model.offers(effect)]
-            raise EffectRequestError(f'{self.name} does not act in {model.title}, must be one of '
+            raise EffectRequestError(f'{name} does not act in {model.title}, must be one of '
                                      f'{", ".join(offered)}')
-        return replace(self, effect=model.bound(self.effect))
+        return cls(model.bound(effect), drives and tuple(sorted(drives, key=model.drives.index)))
 
     @property
     def name(self) -> str:
@@ -113,13 +94,3 @@ class EffectRequest:
         assert self.drives is not None
         return self.drives[0]
 
-
-def requested(text: str, model: DriveModel) -> EffectRequest:
-    """Read a request for a model.
-
-    Raises
-    ------
-    PprsError
-        As `EffectRequest.of` and `EffectRequest.placed`.
-    """
-    return EffectRequest.of(text, model.drives).placed(model)

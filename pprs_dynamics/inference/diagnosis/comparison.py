@@ -10,8 +10,8 @@ join the fit, until no pattern lowers the cost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -43,25 +43,13 @@ MOST_STATEMENTS = 3  # per drive
 PROPOSALS, PROPOSED = 4, -30.0  # fitted in full, of each scan; lowest score of these
 
 
-@dataclass(frozen=True)
-class Localisation:
-    """Patterns of the error, and the noise of the drives.
-
-    Parameters
-    ----------
-    statements : tuple of Statement
-        Of all drives, by evidence.
-    noise : mapping of str to NoiseSpectrum
-        Of what remains of the error of each drive; not of drives with too few samples.
-    """
-
-    statements: tuple[Statement, ...]
-    noise: Mapping[str, NoiseSpectrum]
+Localised = tuple[tuple[Statement, ...], Mapping[str, NoiseSpectrum]]
+"""Statements on all drives, by evidence, and the noise of each drive with enough samples."""
 
 
-def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
-             ) -> Localisation:
-    """Return the patterns of the error of each drive that noise does not explain.
+def localise(residuals: Residuals, progress: Callable[[float], None] = lambda share: None,
+             ) -> Localised:
+    """Return the patterns of the error of each drive that noise does not explain, and the noise.
 
     Parameters
     ----------
@@ -77,10 +65,8 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
         if found is not None:
             statements.extend(found[0])
             noise[name] = found[1]
-        if progress:
-            progress((drive + 1) / len(residuals.drives))
-    return Localisation(tuple(sorted(
-        statements, key=lambda statement: -statement.evidence)), noise)
+        progress((drive + 1) / len(residuals.drives))
+    return tuple(sorted(statements, key=lambda statement: -statement.evidence)), noise
 
 
 def _search(residuals: Residuals, drive: int) -> tuple[list[Statement], NoiseSpectrum] | None:
@@ -158,7 +144,7 @@ class DriveComparison(JsonRecord):
     noise_floor: float | None
     unit: str
     pattern: float
-    is_little: bool = False
+    is_little: bool
 
     @property
     def unexplained(self) -> float:
@@ -190,8 +176,10 @@ class Comparison(JsonRecord):
         Errors of each drive that was measured.
     rms, relative : float
         Pooled over drives [N]; and over the pooled effort.
-    localisation : Localisation
-        Where it fails.
+    statements : tuple of Statement
+        Patterns of all errors.
+    noise : mapping of str to NoiseSpectrum
+        Of what remains of the error of each drive; not of drives with too few samples.
     unit : str
         Of errors over all drives.
     little : mapping of str to float
@@ -203,14 +191,15 @@ class Comparison(JsonRecord):
     drives: Mapping[str, DriveComparison]
     rms: float
     relative: float
-    localisation: Localisation
-    unit: str = 'N'
-    little: Mapping[str, float] = field(default_factory=dict)
+    statements: tuple[Statement, ...]
+    noise: Mapping[str, NoiseSpectrum]
+    unit: str
+    little: Mapping[str, float]
 
     @property
     def where(self) -> tuple[Statement, ...]:
         """Statements that explain a visible share of the squared error, the largest first."""
-        large = [statement for statement in self.localisation.statements
+        large = [statement for statement in self.statements
                  if statement.drive in self.drives
                  and not self.drives[statement.drive].relative < DECISIONS.negligible
                  and statement.share_of_error >= DECISIONS.statement_share
@@ -261,7 +250,7 @@ class Comparison(JsonRecord):
         return {name: drive.noise_floor for name, drive in self.drives.items()}
 
 
-def compare(residuals: Residuals, localisation: Localisation | None = None,
+def compare(residuals: Residuals, localised: Localised | None = None,
             floors: Mapping[str, float] = MappingProxyType({}),
             little: Mapping[str, float] = MappingProxyType({})) -> Comparison:
     """Return how the model compares with the measurement.
@@ -269,39 +258,39 @@ def compare(residuals: Residuals, localisation: Localisation | None = None,
     Parameters
     ----------
     residuals : Residuals
-    localisation : Localisation, optional
+    localised : Localised, optional
         Of these residuals, where it is known already.
     floors : mapping of str to float, optional
         The noise of the drives [N], see `search.noise_floors`.
     little : mapping of str to float, optional
         Drives of whose effort little is explained, see `search.explained_effort`.
     """
-    where = localisation or localise(residuals)
+    statements, noise = localised or localise(residuals)
     shares = explained_shares(residuals)
-    drives = {name: _compare_drive(residuals, name, where, share, floors.get(name),
-                                   name in little) for name, share in shares.items()}
+    drives = {name: _compare_drive(
+        residuals, name, [statement for statement in statements if statement.drive == name],
+        noise.get(name), share, floors.get(name), name in little)
+        for name, share in shares.items()}
     samples = [drive.samples for drive in drives.values()]
     rms, effort = (float(np.sqrt(np.average(np.square(values), weights=samples))) for values in (
         [drive.rms for drive in drives.values()], [drive.effort for drive in drives.values()]))
     constant = all(np.isnan(drive.relative) for drive in drives.values())
-    return Comparison(drives, rms, float('nan') if constant else rms / effort, where,
+    return Comparison(drives, rms, float('nan') if constant else rms / effort, statements, noise,
                       residuals.unit, little)
 
 
 def _compare_drive(
-    residuals: Residuals, name: str, where: Localisation, share: float, floor: float | None,
-    is_little: bool,
+    residuals: Residuals, name: str, statements: Sequence[Statement],
+    noise: NoiseSpectrum | None, share: float, floor: float | None, is_little: bool,
 ) -> DriveComparison:
     index = residuals.drives.index(name)
     known = np.isfinite(residuals.measured[:, index])
     error, effort = residuals.error[known, index], residuals.measured[known, index]
     rms, swing = root_mean_square(error), root_mean_square(effort - effort.mean())
-    noise = where.noise.get(name)
     if floor is not None and noise is not None and noise.period == residuals.period:
         # What no pattern explains is an upper bound of the noise.
         floor = noise_at_most(floor, noise.rms)
-    most = max((statement.mean_square for statement in where.statements
-                if statement.drive == name), default=0.0)
+    most = max((statement.mean_square for statement in statements), default=0.0)
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
         float('nan') if np.isnan(share) else rms / swing, share, len(error), floor,

@@ -12,7 +12,7 @@ began where the first window that reports it says: within that window, or with i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -73,25 +73,6 @@ class LiveEffect(JsonRecord):
 
 
 @dataclass(frozen=True)
-class Window:
-    """Diagnosis of one window of the stream, with the fitted models.
-
-    Parameters
-    ----------
-    span : (float, float)
-        Begin and end [s], on the stream's clock.
-    diagnosis : dict
-        JSON of `pprs diagnose`.
-    adopted : DriveModel
-        The model with its fitted numbers and the reported effects.
-    """
-
-    span: tuple[float, float]
-    diagnosis: Mapping[str, Any]
-    adopted: DriveModel
-
-
-@dataclass(frozen=True)
 class LiveDiagnosis(JsonRecord):
     """Effects found in a stream up to its latest window; immutable.
 
@@ -101,8 +82,12 @@ class LiveDiagnosis(JsonRecord):
         As given: every window is diagnosed against it.
     effects : tuple of LiveEffect
         Effects of the latest windows; only confirmed ones are claimed.
-    last : Window, optional
-        The latest window that was diagnosed.
+    latest : mapping
+        JSON of the diagnosis of the latest window.
+    window : (float, float) or None
+        Begin and end of the latest window, by the stamps of the stream [s].
+    fitted : DriveModel, optional
+        The model with the numbers and the effects of that diagnosis.
     withdrawn : tuple of LiveEffect
         Claimed before, but not supported by the latest window.
     note : str
@@ -116,7 +101,9 @@ class LiveDiagnosis(JsonRecord):
 
     model: DriveModel
     effects: tuple[LiveEffect, ...] = ()
-    last: Window | None = None
+    latest: Annotated[Mapping[str, Any], Diagnosis] = field(default_factory=dict)
+    window: tuple[float, float] | None = None
+    fitted: DriveModel | None = None
     withdrawn: tuple[LiveEffect, ...] = ()
     note: str = ''
     reference: Reference | None = None
@@ -132,15 +119,10 @@ class LiveDiagnosis(JsonRecord):
         Numbers of a window were fitted together: they are valid only with all of its effects.
         """
         names = {effect.found.name for effect in self.effects}
-        if self.last is None or not names or self.claimed != self.effects or names != {
-                effect['name'] for effect in self.last.diagnosis['effects']}:
+        if self.fitted is None or not names or self.claimed != self.effects or names != {
+                effect['name'] for effect in self.latest['effects']}:
             return {}
-        return dict(self.last.adopted.values)
-
-    @property
-    def latest(self) -> Annotated[Mapping[str, Any], Diagnosis]:
-        """JSON of the diagnosis of the latest window."""
-        return {} if self.last is None else self.last.diagnosis
+        return dict(self.fitted.values)
 
     @property
     def confirmed(self) -> bool:
@@ -161,11 +143,6 @@ class LiveDiagnosis(JsonRecord):
         return '; '.join(filter(None, [little, *(
             effect.sentence(self.model.drives) for effect in self.claimed)]))
 
-    @property
-    def window(self) -> tuple[float, float] | None:
-        """Begin and end of the latest window, by the stamps of the stream [s]."""
-        return self.last.span if self.last else None
-
     def with_window(self, recording: Recording, start: float) -> LiveDiagnosis:
         """Return the live diagnosis updated by one more window.
 
@@ -184,11 +161,9 @@ class LiveDiagnosis(JsonRecord):
         if share_in_motion(recording.time, recording.position, MOVING) < LEAST_MOTION:
             return replace(self, withdrawn=(), note='the robot hardly moves: no diagnosis')
         answer = diagnose(self.model, [recording], reference=self.reference)
-        window = Window((start, start + float(recording.time[-1] - recording.time[0])),
-                        answer.to_dict(), answer.adopted)
         holds, effects = self._holds(recording), []
         for found in answer.effects:
-            begun = None if self.last is None else start
+            begun = None if self.fitted is None else start
             effect = LiveEffect(found, frozenset({found.name}).union(*(
                 names for names in answer.indistinguishable if found.name in names)),
                 begun if found.course is None else start + found.course.begin)
@@ -199,13 +174,15 @@ class LiveDiagnosis(JsonRecord):
         missed = [present for present in self.claimed
                   if not any(present.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.
-        return replace(self, effects=(*effects, *(missed if holds else ())), last=window, note='',
-                       withdrawn=() if holds else tuple(missed))
+        return replace(
+            self, effects=(*effects, *(missed if holds else ())), latest=answer.to_dict(),
+            window=(start, start + float(recording.time[-1] - recording.time[0])),
+            fitted=answer.adopted, note='', withdrawn=() if holds else tuple(missed))
 
     def _holds(self, recording: Recording) -> bool:
         """Return whether the model of the last window predicts a recording better."""
-        if self.last is None or not self.effects:
+        if self.fitted is None or not self.effects:
             return False
         before, after = (measure_residuals(model, [recording])[0]
-                         for model in (self.model, self.last.adopted))
+                         for model in (self.model, self.fitted))
         return predictive_gain(before, after).confirms

@@ -163,11 +163,16 @@ class Information:
     noise: Mapping[int, NoiseSpectrum]
 
     @classmethod
-    def of(cls, given: DriveModel, model: DriveModel, forces: Forces, time: Array,
+    def of(cls, given: DriveModel, model: DriveModel, series: JointSeries,
            terms: Sequence[FittedTerm], noise: Mapping[int, NoiseSpectrum]) -> Information:
-        """Return the information of terms and of the base columns of any motion."""
+        """Return the information of terms and of the base columns of any motion, such as one."""
         found = cls(given, model, (), tuple(terms), noise)
-        return replace(found, base=found.on_motion(forces, time).base)
+        return replace(found, base=found.on_motion(series).base)
+
+    @property
+    def noise_floor(self) -> float:
+        """Largest root of the mean squared noise of a drive [N]."""
+        return max(noise.rms for noise in self.noise.values())
 
     @property
     def size(self) -> int:
@@ -198,18 +203,12 @@ class Information:
             yield d, np.concatenate([none[:0], *(rows.get(d, none[0])[None] for rows in base), *(
                 rows.get(d, np.repeat(none, size, axis=0)) for size, rows in terms)])
 
-    def on_motion(self, forces: Forces, time: Array, block: int = 1) -> Design:
-        """Return the design of a motion.
-
-        Parameters
-        ----------
-        forces : Forces
-            Of the model, before its sensors.
-        time : (N,) array
-        block : int
-            Samples that are averaged.
+    def on_motion(self, series: JointSeries, time: Array | None = None, block: int = 1) -> Design:
+        """Return the design of a motion at times [s], by default few, of which blocks are averaged.
         """
-        return Design.planned(self._sensitivities, forces, time, block)
+        time = coarse_time(series) if time is None else time
+        return Design.planned(
+            self._sensitivities, self.model.drive_forces(series.motion(time)), time, block)
 
     def prior(self) -> Array:
         """Return the prior precision of the base columns."""
@@ -227,9 +226,9 @@ class Information:
                 gram += white @ white.T
         return gram
 
-    def of_motion(self, design: Design, duration: float) -> Array:
-        """Return the information of a motion of some duration [s], at any sampling rate."""
-        white = [whitened(rows, self.noise[d], duration)
+    def of_motion(self, design: Design) -> Array:
+        """Return the information of a motion, at any sampling rate."""
+        white = [whitened(rows, self.noise[d], design.residuals.period)
                  for d, rows in self.columns(design) if d in self.noise]
         return sum((rows @ rows.T for rows in white), np.zeros((self.size,) * 2))
 
@@ -247,13 +246,14 @@ def _key(column: BaseColumn) -> str:
     return repr(replace(column, rows={}))
 
 
-def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
+def whitened(rows: Array, noise: NoiseSpectrum, period: float) -> Array:
     """Return the DCT of rows of a motion, (p, n), per standard deviation of the noise.
 
-    Fewer samples than the noise has count for as many, as long as they follow the motion.
+    Fewer samples than the noise has count for as many, as long as they follow the motion: one in a
+    period [s].
     """
     count = rows.shape[-1]
-    density = noise.power(np.arange(count) / (2 * duration)) * count * noise.period / duration
+    density = noise.power(np.arange(count) / (2 * count * period)) * noise.period / period
     white: Array = fft.dct(rows, norm='ortho', axis=-1) / np.sqrt(density)
     return white
 
@@ -318,8 +318,6 @@ class Question:
     contests : tuple of Contest
     subjects : tuple of str
         Effects in question.
-    noise_floor : float
-        Largest root of the mean squared noise of a drive [N].
     """
 
     kind: str
@@ -327,17 +325,14 @@ class Question:
     known: Array
     contests: tuple[Contest, ...]
     subjects: tuple[str, ...]
-    noise_floor: float
 
-    def gram(self, motions: Motions, series: JointSeries) -> Array:
-        """Return the information of a motion, (P, P)."""
-        time = coarse_time(series)
-        moved = replace(motions, model=self.information.model).forces(series, time)
-        return self.information.of_motion(self.information.on_motion(moved, time), series.duration)
+    def after(self, series: JointSeries) -> Array:
+        """Return what is known after a motion in addition to the recordings, (P, P)."""
+        return self.known + self.information.of_motion(self.information.on_motion(series))
 
-    def worth(self, gram: Array) -> float:
-        """Return less the mean of 1 / (1 + misfit), of a motion in addition to the recordings."""
-        gram = self.known + gram
+    def worth(self, series: JointSeries) -> float:
+        """Return less the mean of 1 / (1 + misfit) after a motion."""
+        gram = self.after(series)
         return -float(np.mean([1 / (1 + contest.misfit(gram)) for contest in self.contests]))
 
 
@@ -371,8 +366,10 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
-    question = _question(SEPARATE, fits.design, fits.regression, placed[0].fit, motions, every)
-    information, contests = question.information, []
+    information = Information.of(
+        fits.design.given, fits.design.model, motions.drawn(0, 1)[0],
+        [term for group in every for term in group], fits.regression.noise(placed[0].fit))
+    contests = []
     for (refitted, true), more in joined.items():
         free = information.places((*terms[refitted], *more))
         certain = information.force(terms[refitted])
@@ -382,7 +379,8 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
         contests.append(Contest(
             information.force(terms[true]) - certain, (*range(len(information.base)), *free),
             *sides, rows[refitted].cost - rows[true].cost))
-    return replace(question, contests=tuple(contests), subjects=_names(terms[:1]))
+    known = information.of_recordings(fits.design, fits.regression, placed[0].fit)
+    return Question(SEPARATE, information, known, tuple(contests), _names(terms[0]))
 
 
 def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm, ...]:
@@ -414,20 +412,21 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
     if not (model.has_links or model_numbers(model)):
         model = DriveModel.from_parameters({**model.values, **{
             f'tolerances.{key}': TOLERANCE for key in NUMBERS if np.any(model.values[key])}})
-    groups = [(term,) for term in _common_terms(model)]
+    series, terms = motions.drawn(0, 1)[0], _common_terms(model)
     if recordings:
         design = Design.of(model, recordings)
         regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
-        return _question(COMMISSION, design, regression, regression.fit(()), motions, groups)
-    series = motions.drawn(0, 1)[0]
-    largest = np.abs(motions.forces(series, coarse_time(series)).total).max(axis=0)
-    levels = np.maximum(NOISE_SHARE * largest, 1e-9)
-    information = _information(model, model, motions, groups, {
-        d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
-        for d, level in enumerate(levels)})
-    return Question(COMMISSION, information, information.prior(),
-                    _numbers(information, groups), _names(groups), float(levels.max()))
+        fit = regression.fit(())
+        information = Information.of(model, model, series, terms, regression.noise(fit))
+        known = information.of_recordings(design, regression, fit)
+    else:
+        largest = np.abs(model.drive_forces(series.motion(coarse_time(series))).total).max(axis=0)
+        information = Information.of(model, model, series, terms, {
+            d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
+            for d, level in enumerate(np.maximum(NOISE_SHARE * largest, 1e-9))})
+        known = information.prior()
+    return Question(COMMISSION, information, known, _numbers(information), _names(terms))
 
 
 def _common_terms(model: DriveModel) -> list[FittedTerm]:
@@ -455,22 +454,12 @@ def _common_terms(model: DriveModel) -> list[FittedTerm]:
     return terms
 
 
-def _question(kind: str, design: Design, regression: Regression, fit: JointFit, motions: Motions,
-              groups: Sequence[Sequence[FittedTerm]]) -> Question:
-    """Return the question of the numbers of effects after recordings, under the noise of a fit."""
-    information = _information(design.given, design.model, motions, groups, regression.noise(fit))
-    floor = max(regression.noise_floor(fit, d) for d in regression.drives)
-    return Question(kind, information, information.of_recordings(design, regression, fit),
-                    _numbers(information, groups), _names(groups), floor)
+def _names(terms: Sequence[FittedTerm]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(term.component.effect.name for term in terms))
 
 
-def _names(groups: Sequence[Sequence[FittedTerm]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(term.component.effect.name for terms in groups for term in terms))
-
-
-def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]],
-             ) -> tuple[Contest, ...]:
-    """Return a contest for each number of terms, which are fitted group by group, and of the model.
+def _numbers(information: Information) -> tuple[Contest, ...]:
+    """Return a contest for each number of the model, and of each term, which is fitted alone.
 
     Columns of the model's numbers are per standard deviation of what is known beforehand.
     """
@@ -478,10 +467,10 @@ def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]],
     asked: list[tuple[int, tuple[str, str, float, float], tuple[int, ...]]] = [
         (k, (column.number.label, column.number.unit, column.number.deviation, 1.0), ())
         for k, column in enumerate(information.base) if isinstance(column, ModelNumber)]
-    for terms in groups:
-        places, labels = information.places(terms), [
-            label for term in terms for label in term.labels(model)]
-        asked += [(place, label, places) for place, label in zip(places, labels, strict=True)]
+    for term in information.terms:
+        places = information.places([term])
+        asked += [(place, label, places)
+                  for place, label in zip(places, term.labels(model), strict=True)]
     found = []
     for place, (label, unit, scale, coefficient), fitted in asked:
         missing = np.zeros(information.size)
@@ -489,15 +478,6 @@ def _numbers(information: Information, groups: Sequence[Sequence[FittedTerm]],
         found.append(Contest(missing, tuple(k for k in (*base, *fitted) if k != place), (label,),
                              unit=unit, scale=scale))
     return tuple(found)
-
-
-def _information(given: DriveModel, model: DriveModel, motions: Motions,
-                 subjects: Sequence[Sequence[FittedTerm]], noise: Mapping[int, NoiseSpectrum],
-                 ) -> Information:
-    series = motions.drawn(0, 1)[0]
-    time = coarse_time(series)
-    return Information.of(given, model, replace(motions, model=model).forces(series, time), time,
-                          [term for terms in subjects for term in terms], noise)
 
 
 class PurposeError(PprsError, ValueError):
@@ -686,16 +666,15 @@ def next_experiment(
     motions = Motions(model, duration)
     question = (commissioning(model, recordings, motions) if purpose == COMMISSION else
                 question_of(model, recordings, motions, lambda share: report(0.2 * share)))
-    motions = replace(motions, effort_reserve=RESERVE * question.noise_floor)
+    motions = replace(motions, effort_reserve=RESERVE * question.information.noise_floor)
     return design_experiment(question, motions, seed, lambda share: report(0.2 + 0.8 * share))
 
 
 def design_experiment(question: Question, motions: Motions, seed: int,
                       progress: Callable[[float], None] = lambda share: None) -> Experiment:
     """Return the motion that answers a question best."""
-    best = design(motions, motions.drawn(seed),
-                  lambda series: question.worth(question.gram(motions, series)), seed, progress)
-    after = question.known + question.gram(motions, best)
+    best = design(motions, motions.drawn(seed), question.worth, seed, progress)
+    after = question.after(best)
     return Experiment(
         question.kind, question.subjects, _expected(question, after), _accuracies(question, after),
         motions.uses(best), best.duration, lambda time: motions.sampled(best, time),
