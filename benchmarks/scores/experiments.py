@@ -136,7 +136,7 @@ def ambiguous_start(name: str, seed: int) -> Start | None:
                                    lambda share: None)
             if rivals_of(name, question):
                 return Start(robot, how, motion, old, question)
-            if not question.subjects or question.kind == 'commission':
+            if question.kind == 'commission':
                 break
     return None
 

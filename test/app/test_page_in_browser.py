@@ -25,7 +25,7 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -39,7 +39,7 @@ def made_up_pages() -> dict[str, Page]:
     diagnosis = made.made_up_diagnosis(
         effects=(made.found_effect('coulomb_friction', ('lift_2', 'slide_1')),),
         sets=made.ranked_sets('coulomb_friction', 'hysteresis'))
-    words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
+    words = Sentences(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
     return {
         'diagnosis': diagnosis_page(diagnosis, words, ['my run.mcap']),
         'adoption': _adoption(diagnosis.residuals)}

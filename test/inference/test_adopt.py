@@ -139,7 +139,7 @@ def test_blocks_of_the_same_recording_are_told_as_weak_evidence(files: Files) ->
 def test_force_overrides_and_is_recorded(files: Files) -> None:
     answer = requested(files, f'{WRONG}:axis', force=True)
     assert answer.adopted
-    step, = read_steps(LedgerBook((RecordingEntry.of(files.recordings[0]),), ()).entered(
+    step, = read_steps(LedgerBook((RecordingEntry(files.recordings[0]),), ()).entered(
         answer).values)
     assert step.forced
     assert 'explains these recordings better' in ' '.join(step.objections)

@@ -18,7 +18,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.measurement.files.recording import Recording
@@ -62,7 +62,7 @@ def given_and_recorded(there: Effects, true: Effects, seed: int = 0,
 
 
 def booked(adoption: object, recording: Recording) -> DriveModel:
-    entry = RecordingEntry.of(recording)
+    entry = RecordingEntry(recording)
     model = LedgerBook((entry,), ()).entered(adoption)  # type: ignore[arg-type]
     return model
 
@@ -89,7 +89,7 @@ def test_an_effect_that_does_not_hold_is_a_finding_with_both_values(case: str) -
         assert abs(estimate.value - truth[key]) < 4 * estimate.std < 0.3 * abs(
             given[key] - truth[key])
     assert effect.to_dict()['in_model'] == dict(effect.in_model)
-    headline = word_diagnosis(found).headline
+    headline = Sentences(found).headline
     assert f'{name}' in headline
     assert 'is in the model with' in headline
     assert 'lacks' not in headline or found.indistinguishable

@@ -15,7 +15,7 @@ from made_up_arm import motion, real_arm, record, write_arm
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel, compare, diagnose, fit
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
@@ -54,7 +54,7 @@ def test_diagnose_calls_no_model_adequate_that_explains_little(tmp_path: Path) -
     found = diagnose(model, unrelated(model)).diagnosis
     assert found.verdict == 'unknown'
     assert 'turn' in found.little
-    words = word_diagnosis(found)
+    words = Sentences(found)
     assert words.headline.startswith('The model')
     assert 'of the effort of turn' in words.headline
     assert 'Nothing to add' not in words.following

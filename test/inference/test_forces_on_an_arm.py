@@ -20,7 +20,7 @@ from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
@@ -265,7 +265,7 @@ def test_another_mounting_is_named_with_the_line_of_the_model_file(
 ) -> None:
     found = diagnose(arm, [recorded((x, z))])
     assert (found.verdict, found.effects) == ('unknown', ())
-    assert 'the robot is mounted in another direction' in word_diagnosis(found).headline
+    assert 'the robot is mounted in another direction' in Sentences(found).headline
     assert_gravity(next_step(found, GivenFiles())[0], x, z)
 
 

@@ -22,7 +22,7 @@ from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -205,7 +205,7 @@ def test_with_all_that_is_reported_in_the_model_nothing_is_missing(name: str) ->
 
 def test_each_of_several_adopted_effects_has_its_step_in_the_ledger() -> None:
     recordings = [recorded('two', 1), recorded('two', 2)]
-    book = LedgerBook(tuple(map(RecordingEntry.of, recordings)), ())
+    book = LedgerBook(tuple(map(RecordingEntry, recordings)), ())
     walk = adopt_all(axis(), recordings, record=book.entered, diagnosis=diagnosed('two', 1, 2))
     assert {step.effect for step in read_steps(walk.model.values)} == set(HIDDEN['two'])
 
@@ -286,7 +286,7 @@ def test_an_effect_that_begins_has_a_time_and_held_out_recordings_count(is_there
 def test_no_sentence_asks_for_the_cause_of_an_effect_that_held_out_data_refute(
     is_there: bool,
 ) -> None:
-    words = word_diagnosis(diagnosed_half_way(is_there))
+    words = Sentences(diagnosed_half_way(is_there))
     asks = [words.headline, words.following, words.command,
             *(f'{effect.title} {effect.what} {effect.cause}' for effect in words.effects)]
     assert any('coulomb_friction' in question for question in asks) is is_there

@@ -25,7 +25,7 @@ from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.inference.readings.check import find_mistakes, looks_like
 from pprs_dynamics.inference.readings.findings import OtherReading, effort_looks_like
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
@@ -180,7 +180,7 @@ def test_what_was_read_wrongly_is_no_effect_whatever_explains_it(kind: str) -> N
     found = diagnose(axis(), [replace(axis_recording(real), findings=(doubt,))], as_it_is=True)
     assert found.verdict == 'unknown'
     assert [effect.name for effect in found.effects] == ['coulomb_friction']
-    words = word_diagnosis(found)
+    words = Sentences(found)
     assert words.headline.startswith('The efforts look like those of another drive or unit. ')
     assert words.command.startswith('pprs info ')
 

@@ -111,7 +111,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     white = np.zeros((6, len(regression.noise_shapes.corners) + 1))
     white[:, 0] = 0.05 ** 2
     fit = regression.at((), white)
-    information = Information.of(design.given, design.model, series, TERMS, regression.noise(fit))
+    information = Information(design.given, design.model, series, TERMS, regression.noise(fit))
     known = information.of_recordings(design, regression, fit) - information.prior()
     # Smoothing drops half a window at either end, and the transform a few samples more.
     time = design.recordings[0].time[:5 * len(regression.series[0])]

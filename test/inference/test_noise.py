@@ -76,8 +76,8 @@ def test_whitened_noise_is_white_of_unit_variance_also_across_segments(phi: floa
 @pytest.mark.parametrize('seed', range(3))
 def test_no_other_amplitudes_have_a_higher_likelihood(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    bands = FrequencyBands.of(40.0, PERIOD)
-    shapes = NoiseShapes.of(bands)
+    bands = FrequencyBands(40.0, PERIOD)
+    shapes = NoiseShapes(bands)
     counts = np.maximum(np.round(np.diff(np.clip(bands.edges, 0, 0.5 / PERIOD)) * 80), 1.0)
     true = np.zeros(len(shapes.at_bands))
     true[0] = 1.0
@@ -234,7 +234,7 @@ def test_the_noise_is_that_of_the_samples_that_were_measured(every: int) -> None
 
 
 def test_a_drive_without_any_noise_has_finite_noise() -> None:
-    shapes = NoiseShapes.of(FrequencyBands.of(20.0, PERIOD))
+    shapes = NoiseShapes(FrequencyBands(20.0, PERIOD))
     bands = shapes.at_bands.shape[1]
     nothing, counts = np.zeros((1, bands)), np.full((1, bands), 10.0)
     with np.errstate(all='raise'):

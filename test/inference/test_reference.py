@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
 from pprs_dynamics.inference.diagnosis.sentences import (
-    word_diagnosis,
+    Sentences,
     word_reference,
 )
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
@@ -100,7 +100,7 @@ def test_a_change_of_friction_is_told_alone(machine: tuple[DriveModel, Reference
     assert found.effects[0].drives == ('swing',)
     value = found.effects[0].parameters['swing.force']
     assert abs(value.value - 0.4) < 2 * value.std < 0.2
-    assert word_diagnosis(found.diagnosis).headline.startswith('Since run_0_1: ')
+    assert Sentences(found.diagnosis).headline.startswith('Since run_0_1: ')
 
 
 def test_a_reference_of_another_motion_does_not_date_an_effect(
@@ -108,7 +108,7 @@ def test_a_reference_of_another_motion_does_not_date_an_effect(
     model, _ = machine
     found = pprs.diagnose(model, run(model, 5, 3, change=0.4), reference=run(model, 0, 1))
     assert found.to_dict()['reference']['covered'] < 0.5
-    words = word_diagnosis(found.diagnosis)
+    words = Sentences(found.diagnosis)
     assert 'Since' not in words.headline
     assert any('may be older than the reference' in line for line in words.reference)
 

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.adoption.adopt import AdoptionRun
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import change, fall, with_uncertainty
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
@@ -54,7 +54,7 @@ def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption
     worse = made.made_up_diagnosis('adequate', unconfirmed=(
         made.found_effect('hysteresis', held_out_after=0.3,
                      objection='held-out data are predicted worse with it'),))
-    words = word_diagnosis(worse)
+    words = Sentences(worse)
     assert 'lacks' not in words.headline
     assert words.headline == 'No effect is supported by held-out data.'
     assert not words.effects
@@ -84,14 +84,14 @@ def test_a_row_shows_a_fall_of_the_error_that_three_digits_hide() -> None:
 @pytest.mark.parametrize('make', [ambiguous, everything])
 def test_the_terminal_keeps_its_width_and_the_page_shows_everything(make: Any) -> None:
     diagnosis = make()
-    words = word_diagnosis(diagnosis)
+    words = Sentences(diagnosis)
     assert len(re.findall(r'[.;](?: |$)', words.headline)) <= 2
     text = as_text(diagnosis_view(diagnosis, words, next_step=False), 80)
     assert max(map(len, text.splitlines())) <= 80
     assert words.headline in in_one_line(text)
     shown = unescape(diagnosis_page(diagnosis, words, ['a.csv']).html())
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
-                     *words.refuted, *words.warnings):
+                     *words.refuted, *diagnosis.warnings):
         assert sentence in shown
     for finding in (*words.effects, *words.unexplained):
         for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
@@ -115,7 +115,7 @@ def test_an_effect_that_is_not_confirmed_is_named_beside_those_that_are() -> Non
     refuted = made.found_effect('hysteresis', objection='held-out data are predicted worse with it')
     found = made.made_up_diagnosis('effect', effects=(made.found_effect('coulomb_friction'),),
                                    unconfirmed=(refuted,))
-    words = word_diagnosis(found)
+    words = Sentences(found)
     assert words.headline.startswith('The model lacks coulomb_friction on lift_2. With it the ')
     assert words.refuted == (
         'hysteresis on lift_2: not reported, because held-out data are predicted worse with it',)

@@ -13,7 +13,7 @@ from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import Sentences
 from pprs_dynamics.measurement.motion.stick_slip import find_stick_slip
 
 STEP = 0.01  # [s]
@@ -92,5 +92,5 @@ def test_a_diagnosis_names_it_with_its_frequency_and_claims_nothing_else() -> No
         Recording.from_arrays('run', TIME, position[:, None], None, effort[:, None], ('axis',))])
     assert (found.verdict, found.effects) == ('unknown', ())
     assert found.to_dict()['stick_slip']['axis']['frequency'] == pytest.approx(2.3, abs=0.1)
-    assert 'Stick-slip on axis at 2.3' in word_diagnosis(found).headline
+    assert 'Stick-slip on axis at 2.3' in Sentences(found).headline
     assert 'faster' in next_step(found, PLACEHOLDERS)[0]

@@ -93,8 +93,8 @@ def _brief(diagnosis: Diagnosis, words: sentences.Sentences) -> Iterator[Any]:
         yield terminal.escape(seen)
     if words.refuted:
         yield f'[blue]i[/] {terminal.escape(words.refuted[0])}'
-    if words.warnings:
-        yield f'[yellow]![/] {terminal.escape(words.warnings[0])}'
+    if diagnosis.warnings:
+        yield f'[yellow]![/] {terminal.escape(diagnosis.warnings[0])}'
 
 
 def _values(diagnosis: Diagnosis) -> Iterator[TitledTable]:
@@ -181,7 +181,7 @@ def diagnosis_page(
     recordings, validation : sequence of str
         Names of those fitted, and of those held out.
     rivals : sequence of RivalEffect
-        As they were given to `word_diagnosis`.
+        As they were given to `Sentences`.
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
     page.heading('Result')
@@ -193,7 +193,7 @@ def diagnosis_page(
         _errors(page, diagnosis)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
-    page.folded_list('Warnings', words.warnings, is_open=True)
+    page.folded_list('Warnings', diagnosis.warnings, is_open=True)
     suspects, refuted, calibrated = _lists(words)
     page.heading('Evidence')
     for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
@@ -341,7 +341,7 @@ class DiagnosisResult(Result):
 
     @cached_property
     def _words(self) -> Any:
-        return sentences.word_diagnosis(self.diagnosis, self.inputs.files, self._rivals)
+        return sentences.Sentences(self.diagnosis, self.inputs.files, self._rivals)
 
 
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,

@@ -265,7 +265,7 @@ class Inputs:
         from pprs_dynamics.inference.adoption.adoption import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
-            return tuple(RecordingEntry.of(recording, name if name in self.paths else None)
+            return tuple(RecordingEntry(recording, name if name in self.paths else None)
                          for name, recording in recordings.items())
         return LedgerBook(entries(self.recordings), entries(self.validation))
 

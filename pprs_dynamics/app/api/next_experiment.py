@@ -45,9 +45,9 @@ def platform_rows(motion: PlatformMotion) -> Rows:
 
 def drive_rows(experiment: Experiment, motion: Motion) -> Rows:
     """Return position, velocity, acceleration and effort of every drive over time."""
-    assert motion.time is not None
-    forces = experiment.forces(motion.time)
-    state, model = forces.mechanism, experiment.model
+    model = experiment.model
+    forces = model.drive_forces(motion)
+    state = forces.mechanism
     return {f'{name} [{common_unit(model.units, unit).replace("^2", "²")}]':
             dict(zip(model.drives, values.T, strict=True))
             for name, unit, values in (

@@ -17,7 +17,6 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.fit_curve import curve_variable
 from pprs_dynamics.inference.diagnosis.comparison import Comparison
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS, Statement, in_words, read_in
@@ -82,7 +81,8 @@ def curve_with_band(answer: Adoption) -> Any:
     assert answer.curve is not None
     after, curve = answer.residuals_after, answer.curve.curve
     drive = after.drives.index(answer.request.drive)
-    seen = curve_variable(after, answer.request)
+    seen = after.variable(curve.variable, drive)
+    assert seen is not None
     factor, label = axis_of(curve.variable, after, answer.request.drive)
     left = after.error[:, drive] + curve.force(seen)
     shown = np.linspace(0, len(seen) - 1, min(len(seen), POINTS)).astype(int)
@@ -315,7 +315,7 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     traces = [_means(profile, variable, residuals, statement.drive, None, name, colour)
               for (name, part), colour in zip(parts.items(), (charts.ERROR, charts.MODEL),
                                               strict=False)
-              if (profile := _profile(part, drive, variable, noise)) is not None]
+              if (profile := error_profile(part, drive, variable, noise, FINE_BINS)) is not None]
     if not traces:
         return None
     units = residuals.units_of(statement.drive)
@@ -328,18 +328,6 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
             figure.add_vrect(x0=low, x1=high, fillcolor=charts.MARK, opacity=0.15, line_width=0)
     figure.add_hline(y=0, line={'color': charts.MEASURED, 'width': 0.8})
     return figure
-
-
-def _profile(residuals: Residuals, drive: int, variable: str, noise: NoiseSpectrum,
-             ) -> Profile | None:
-    """Return means over bins of a variable, also of another drive's."""
-    name, of, other = variable.partition(' of ')
-    if of:
-        values = residuals.variable(name, residuals.drives.index(other))
-        if values is None:
-            return None
-        residuals = replace(residuals, variables={**residuals.variables, variable: values})
-    return error_profile(residuals, drive, variable, noise, FINE_BINS)
 
 
 def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str) -> Any:
@@ -356,9 +344,7 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
 def _spectra(residuals: Residuals, drive: str, noise: NoiseSpectrum) -> list[Any]:
     """Return the spectra of the error and of the noise of a drive."""
     found = error_spectrum(residuals, residuals.drives.index(drive), noise)
-    keep = found.frequency > 0
-    frequency, power, background = charts.thinned(found.frequency[keep], found.power[keep],
-                                                  found.background[keep])
+    frequency, power, background = charts.thinned(*(values[found[0] > 0] for values in found))
     unit = _power(residuals.units_of(drive).effort)
     return [charts.trace(frequency, values, f'{drive}: {label}', colour, 1.2,
                          meta={'drive': drive}, hovertemplate=f'%{{y:.3g}} {unit}')

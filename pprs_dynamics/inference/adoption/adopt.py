@@ -21,7 +21,7 @@ import numpy as np
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.fit_curve import (
-    fit_curve,
+    FittedCurve,
     with_curve,
     without_curve,
     without_effect,
@@ -31,6 +31,7 @@ from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import capitalised, change, listed, plain
+from pprs_dynamics.inference.diagnosis.sentences import remarks_on
 from pprs_dynamics.inference.diagnosis.statements import in_words, read_in
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -134,7 +135,7 @@ def original(model: DriveModel) -> DriveModel:
     values = original_values(model.values)
     if all(values[key] == value for key, value in model.values.items()):
         return model
-    return replace(DriveModel.from_parameters(values), source=model.source)
+    return DriveModel.from_parameters(values, model.source)
 
 
 @dataclass(frozen=True)
@@ -253,9 +254,7 @@ def _with_effect(case: _Case, request: EffectRequest, beside: Sequence[FoundEffe
         remarks.append(f'{listed(rivals, "or")} explains the data about as well')
     remarks += [f'{name}{" of " + place.rstrip(".") if place else ""} is removed from the model: '
                 'the recordings show none of it' for place in gone]
-    if effect.at_bound:
-        remarks.append(f'The value of {listed(effect.at_bound)} is at the limit of the values that '
-                       'were tried')
+    remarks += remarks_on(effect)
     if others := [c.name for c in row.effects if c.name != name]:
         remarks.append(f'The recordings also show {listed(others)}')
     # Without the other effects of the row, in the values that they all have together.
@@ -406,7 +405,7 @@ def _with_curve(case: _Case, request: EffectRequest) -> Adoption:
     model, drive = case.model, request.drive
     bare = without_curve(model, drive)
     start, _ = measure_residuals(bare, case.recordings)
-    fitted = fit_curve(start, request)
+    fitted = FittedCurve(start, request)
     after = with_curve(bare, drive, fitted)
     if case.validate:
         given, found = (measure_residuals(tried, case.validate)[0] for tried in (bare, after))

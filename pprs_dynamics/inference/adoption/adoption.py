@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from typing import Any
@@ -123,20 +123,20 @@ class Adoption(JsonRecord):
         return self.request.name
 
 
-@dataclass(frozen=True)
 class RecordingEntry:
-    """A recording as the ledger names it: file, hash, first and last time [s]."""
+    """A recording as the ledger names it: file, hash, first and last time [s].
 
-    name: str
-    sha256: str
-    span: tuple[float, float]
+    Parameters
+    ----------
+    recording : Recording
+    path : path, optional
+        Of its file; it may come from none.
+    """
 
-    @classmethod
-    def of(cls, recording: Recording, path: str | PathLike[str] | None = None) -> RecordingEntry:
-        """Return the ledger's entry of a recording, which may come from no file."""
+    def __init__(self, recording: Recording, path: str | PathLike[str] | None = None) -> None:
         time = recording.epoch + recording.time
-        sha256 = samples_fingerprint(recording) if path is None else fingerprint(path)
-        return cls(recording.name, sha256, (float(time[0]), float(time[-1])))
+        self.name, self.span = recording.name, (float(time[0]), float(time[-1]))
+        self.sha256 = samples_fingerprint(recording) if path is None else fingerprint(path)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class LedgerBook:
     def entered(self, adoption: Adoption) -> DriveModel:
         """Return the model of an adoption with its step in the ledger."""
         values = with_step(adoption.before.values, adoption.after.values, self._step(adoption))
-        return replace(DriveModel.from_parameters(values), source=adoption.before.source)
+        return DriveModel.from_parameters(values, adoption.before.source)
 
     def _step(self, adoption: Adoption) -> Step:
         before, after = (rms_by_drive(residuals) for residuals in (

@@ -11,7 +11,6 @@ likelihood. The same number, against that without a curve, is the evidence.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -23,7 +22,7 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.estimates import Estimate
-from pprs_dynamics.physics.effects.laws.measured_curve import OF, Curve, MeasuredCurve, spline_basis
+from pprs_dynamics.physics.effects.laws.measured_curve import Curve, MeasuredCurve, spline_basis
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_values import UNCERTAINTIES
 
@@ -38,11 +37,16 @@ FLEXIBLE = 0.1  # roughness of the curve with which the noise is estimated
 ACTIVE = 'effects.active'
 
 
-@dataclass(frozen=True)
 class FittedCurve:
-    """A curve with its band.
+    """The curve of a drive's error that has the largest evidence, with its band.
 
     Parameters
+    ----------
+    residuals : Residuals
+        Of the model that the curve joins.
+    request : EffectRequest
+
+    Attributes
     ----------
     curve : Curve
     covariance : (p, p) array
@@ -53,13 +57,60 @@ class FittedCurve:
         Effective number of coefficients.
     held_out : (M,) array
         Its force in each tenth of the recordings by a fit to the others [N].
+
+    Raises
+    ------
+    EffectRequestError
+        Where the variable is not known of this robot or does not vary, or the drive was not
+        measured.
     """
 
-    curve: Curve
-    covariance: Array
-    evidence: float
-    freedom: float
-    held_out: Array
+    def __init__(self, residuals: Residuals, request: EffectRequest) -> None:
+        drive = residuals.drives.index(request.drive)
+        x = residuals.variable(request.variable, drive)
+        if x is None:
+            raise EffectRequestError(
+                f'{request.name}: {request.variable} is not known of this robot')
+        try:
+            regression = Regression(residuals, drives=(drive,))
+        except ResidualsError:
+            raise EffectRequestError(f'{request.name}: {request.drive} was not measured, or at few '
+                                     'samples only') from None
+        seen = x[np.isfinite(residuals.measured[:, drive])]
+        start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
+        if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
+            raise EffectRequestError(
+                f'{request.name}: {request.variable} hardly varies in the recordings')
+        turns = bool(request.variable.startswith('position') and seen.max() - seen.min() >= TURN
+                     and residuals.units_of(request.drive).position == 'rad')
+        if turns:
+            start, end = -pi, pi
+        scale = root_mean_square(residuals.error[np.isfinite(residuals.measured[:, drive]), drive])
+
+        columns = spline_basis(x, start, end, INTERVALS, turns).toarray().T
+        unit = np.eye(len(columns))
+        second = (unit - 2 * np.roll(unit, 1, 1) + np.roll(unit, 2, 1) if turns
+                  else np.diff(unit, 2, axis=0))
+        rows = {drive: regression.series[drive].transform(columns)}
+
+        def block(share: float) -> Block:
+            """Return the columns of a curve with the precision of its roughness and of its size."""
+            return regression.transformed_block(rows, second.T @ second / (share * scale) ** 2
+                                                + unit / (WIDEST * scale) ** 2)
+
+        # The noise is that of a flexible curve, the same for all.
+        noise = regression.fit((block(FLEXIBLE),))
+        best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
+                   key=lambda fit: fit.deviance)
+        parts = residuals.blocks(BLOCKS)
+        others = np.stack([fit.coefficients for fit in regression.from_others(best, parts)])
+        precision = best.blocks[0].precision
+        self.curve = Curve(request.variable, float(start), float(end),
+                           tuple(best.coefficients.tolist()), turns)
+        self.covariance = best.covariance
+        self.evidence = regression.at((), noise).deviance - best.deviance
+        self.freedom = len(best.coefficients) - float(np.trace(best.covariance @ precision))
+        self.held_out: Array = np.sum(others[parts].T * columns, axis=0)
 
     def parameters(self, drive: str, unit: str) -> dict[str, Estimate]:
         """Return the curve's values with their standard deviations, by key of the model file."""
@@ -74,94 +125,23 @@ class FittedCurve:
         return band
 
 
-def curve_variable(residuals: Residuals, request: EffectRequest) -> Array:
-    """Return the variable at every sample of residuals, (M,).
-
-    Raises
-    ------
-    EffectRequestError
-        Where it is not known of this robot.
-    """
-    name, _, other = request.variable.partition(' of ')
-    drive = residuals.drives.index(other if name in OF and other else request.drive)
-    values = residuals.variable(name, drive)
-    if values is None:
-        raise EffectRequestError(f'{request.name}: {request.variable} is not known of this robot')
-    return values
-
-
-def fit_curve(residuals: Residuals, request: EffectRequest) -> FittedCurve:
-    """Return the curve of a drive's error that has the largest evidence.
-
-    Parameters
-    ----------
-    residuals : Residuals
-        Of the model that the curve joins.
-    request : EffectRequest
-
-    Raises
-    ------
-    EffectRequestError
-        Where the variable does not vary, or the drive was not measured.
-    """
-    drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
-    try:
-        regression = Regression(residuals, drives=(drive,))
-    except ResidualsError:
-        raise EffectRequestError(f'{request.name}: {request.drive} was not measured, or at few '
-                                 'samples only') from None
-    seen = x[np.isfinite(residuals.measured[:, drive])]
-    start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
-    if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
-        raise EffectRequestError(
-            f'{request.name}: {request.variable} hardly varies in the recordings')
-    turns = bool(request.variable.startswith('position') and seen.max() - seen.min() >= TURN
-                 and residuals.units_of(request.drive).position == 'rad')
-    if turns:
-        start, end = -pi, pi
-    scale = root_mean_square(residuals.error[np.isfinite(residuals.measured[:, drive]), drive])
-
-    columns = spline_basis(x, start, end, INTERVALS, turns).toarray().T
-    unit = np.eye(len(columns))
-    second = (unit - 2 * np.roll(unit, 1, 1) + np.roll(unit, 2, 1) if turns
-              else np.diff(unit, 2, axis=0))
-    rows = {drive: regression.series[drive].transform(columns)}
-
-    def block(share: float) -> Block:
-        """Return the columns of a curve with the precision of its roughness and of its size."""
-        return regression.transformed_block(rows, second.T @ second / (share * scale) ** 2
-                                            + unit / (WIDEST * scale) ** 2)
-
-    # The noise is that of a flexible curve, the same for all.
-    noise = regression.fit((block(FLEXIBLE),))
-    best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
-               key=lambda fit: fit.deviance)
-    parts = residuals.blocks(BLOCKS)
-    others = np.stack([fit.coefficients for fit in regression.from_others(best, parts)])
-    precision = best.blocks[0].precision
-    freedom = len(best.coefficients) - float(np.trace(best.covariance @ precision))
-    return FittedCurve(
-        Curve(request.variable, float(start), float(end), tuple(best.coefficients.tolist()), turns),
-        best.covariance, regression.at((), noise).deviance - best.deviance, freedom,
-        np.sum(others[parts].T * columns, axis=0))
-
-
 def with_curve(model: DriveModel, drive: str, fitted: FittedCurve) -> DriveModel:
     """Return a model with a curve on a drive."""
     curve, prefix = fitted.curve, f'effects.{MeasuredCurve.name}.{drive}'
     active = [name for name in model.values.get(ACTIVE, ()) if name != MeasuredCurve.name]
-    return _built(model, {
+    return DriveModel.from_parameters({
         **model.values, ACTIVE: [*active, MeasuredCurve.name],
         f'{prefix}.variable': curve.variable, f'{prefix}.from': curve.start,
         f'{prefix}.to': curve.end, f'{prefix}.periodic': curve.periodic,
-        f'{prefix}.values': list(curve.values)})
+        f'{prefix}.values': list(curve.values)}, model.source)
 
 
 def without_curve(model: DriveModel, drive: str) -> DriveModel:
     """Return a model without a drive's curve: itself, where there is none."""
     if not any(key.startswith(f'effects.{MeasuredCurve.name}.{drive}.') for key in model.values):
         return model
-    return _built(model, without_effect(model.values, MeasuredCurve.name, [f'{drive}.']))
+    return DriveModel.from_parameters(
+        without_effect(model.values, MeasuredCurve.name, [f'{drive}.']), model.source)
 
 
 def without_effect(values: Mapping[str, Any], name: str, places: Sequence[str]) -> dict[str, Any]:
@@ -172,7 +152,3 @@ def without_effect(values: Mapping[str, Any], name: str, places: Sequence[str]) 
     if not any(key.startswith(f'effects.{name}.') for key in found):
         found[ACTIVE] = [other for other in found[ACTIVE] if other != name]
     return found
-
-
-def _built(model: DriveModel, values: dict[str, Any]) -> DriveModel:
-    return replace(DriveModel.from_parameters(values), source=model.source)

@@ -39,7 +39,6 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import Estimates, averaged, calibrations, estimate
 from pprs_dynamics.inference.search.explained_effort import little_explained
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import (
     HeldOut,
     PredictiveGain,
@@ -49,24 +48,9 @@ from pprs_dynamics.inference.search.held_out import (
 from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_SETS = 8  # rows that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
-
-
-def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
-    """Return the model of a set, with the effects that are there at the end and stay.
-
-    Raises
-    ------
-    ModelError
-        For values that no model may have.
-    """
-    base, placed = fitted_model.parts_of(fits, fitted)
-    return fitted_model.model_at(fits.design, base, [effect for effect, component in zip(
-        placed, fitted.blocks, strict=True)
-        if component.course is None or component.course.kind == SINCE])
 
 
 class Answer:
@@ -86,7 +70,8 @@ class Answer:
         self.decisions = table.first.decisions
         self.fits, self.fitted = row.fits, row.fitted
         self.design, self.given = row.fits.design, table.first.design.residuals
-        self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
+        self.drives = self.design.drives
+        self.adopted = fitted_model.fitted_model(row.fits, row.fitted)
         self.remaining = self._remaining()
         # Always that of the best row: the residual of a row that lacks an effect is no noise.
         best = table.best
@@ -186,7 +171,7 @@ class Answer:
             return without.error, self._blocks.error, without.gain(self._blocks)
         try:
             before, after = (measure_residuals(model, self.validate)[0] for model in (
-                model_of(fits, fits.evaluate(less)), self.adopted))
+                fitted_model.fitted_model(fits, fits.evaluate(less)), self.adopted))
         except PprsError:
             return float('nan'), float('nan'), None
         return rms(before), rms(after), predictive_gain(before, after)

@@ -82,39 +82,8 @@ class Finding:
     remarks: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
 class Sentences:
     """A diagnosis in words.
-
-    Parameters
-    ----------
-    headline : str
-        The verdict, at most two sentences.
-    effects, rivals, unexplained : tuple of Finding
-        In the order of `Diagnosis.effects`, of the given rivals, and of `unexplained_groups`.
-    suspects, refuted, calibrated, warnings : tuple of str
-    following, command : str
-        What to do next, in words and for a shell.
-    reference : tuple of str
-        What a reference run covers; none without one.
-    """
-
-    headline: str
-    effects: tuple[Finding, ...]
-    rivals: tuple[Finding, ...]
-    unexplained: tuple[Finding, ...]
-    suspects: tuple[str, ...]
-    refuted: tuple[str, ...]
-    calibrated: tuple[str, ...]
-    warnings: tuple[str, ...]
-    following: str
-    command: str
-    reference: tuple[str, ...] = ()
-
-
-def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
-                   rivals: Sequence[RivalEffect] = ()) -> Sentences:
-    """Return a diagnosis in words.
 
     Parameters
     ----------
@@ -123,23 +92,39 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         For the next command.
     rivals : sequence of RivalEffect, optional
         As `rival_effects` returns them.
+
+    Attributes
+    ----------
+    headline : str
+        The verdict, at most two sentences.
+    effects, rivals, unexplained : tuple of Finding
+        In the order of `Diagnosis.effects`, of the given rivals, and of `unexplained_groups`.
+    suspects, refuted, calibrated : tuple of str
+    following, command : str
+        What to do next, in words and for a shell.
+    reference : tuple of str
+        What a reference run covers; none without one.
     """
-    headline, drives = _headline(diagnosis), diagnosis.residuals.drives
-    if diagnosis.since and diagnosis.since.covered >= HARDLY:
-        headline = (f'Since {listed(diagnosis.since.recordings)}: '
-                    f'{headline[:1].lower()}{headline[1:]}')
-    return Sentences(
-        headline,
-        tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
-        tuple(_rival(diagnosis, rival) for rival in rivals),
-        tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
-        tuple(f'{with_drives(suspect.name, suspect.drives, drives)}: possible, but it costs '
-              f'{-suspect.evidence:.1f} more than it explains. A longer recording decides'
-              for suspect in diagnosis.suspects),
-        tuple(f'{_title(diagnosis, effect)}: not reported, because {effect.objection}'
-              for effect in diagnosis.unconfirmed),
-        tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
-        diagnosis.warnings, *next_step(diagnosis, files), word_reference(diagnosis.since))
+
+    def __init__(self, diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
+                 rivals: Sequence[RivalEffect] = ()) -> None:
+        self.headline, drives = _headline(diagnosis), diagnosis.residuals.drives
+        if diagnosis.since and diagnosis.since.covered >= HARDLY:
+            self.headline = (f'Since {listed(diagnosis.since.recordings)}: '
+                             f'{self.headline[:1].lower()}{self.headline[1:]}')
+        self.effects = tuple(_effect(diagnosis, effect) for effect in diagnosis.effects)
+        self.rivals = tuple(_rival(diagnosis, rival) for rival in rivals)
+        self.unexplained = tuple(Finding(*describe_unexplained(group))
+                                 for group in unexplained_groups(diagnosis))
+        self.suspects = tuple(
+            f'{with_drives(suspect.name, suspect.drives, drives)}: possible, but it costs '
+            f'{-suspect.evidence:.1f} more than it explains. A longer recording decides'
+            for suspect in diagnosis.suspects)
+        self.refuted = tuple(f'{_title(diagnosis, effect)}: not reported, because '
+                             f'{effect.objection}' for effect in diagnosis.unconfirmed)
+        self.calibrated = tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated)
+        self.following, self.command = next_step(diagnosis, files)
+        self.reference = word_reference(diagnosis.since)
 
 
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
@@ -379,7 +364,8 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
     why += '.' if effect.without is None else (
         f'; the best set without it: {_set(diagnosis, effect.without)}.')
     return Finding(_title(diagnosis, effect), f'{what}.', why, sentence(card.causes),
-                   sentence(card.confirm), sentence(card.looks_like), tuple(_remarks(effect)))
+                   sentence(card.confirm), sentence(card.looks_like),
+                   tuple(map(sentence, remarks_on(effect))))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
@@ -421,15 +407,16 @@ def largest_fall(diagnosis: Diagnosis, error: Array, less: Array) -> tuple[str, 
     return max(falls)[1:]
 
 
-def _remarks(effect: FoundEffect) -> Iterator[str]:
+def remarks_on(effect: FoundEffect) -> Iterator[str]:
+    """Yield what is odd about the values of an effect."""
     for key, estimate in effect.parameters.items():
         drive, name = effect.effect.place_and_parameter(key)
         if estimate.value < effect.effect.unphysical_below.get(name, -inf):
             yield (f'{name}{f" on {drive}" if drive else ""} is negative. This is impossible: the '
-                   'model has too much of it, or another effect looks like it.')
+                   'model has too much of it, or another effect looks like it')
     if effect.at_bound:
         yield (f'The value of {listed(effect.at_bound)} is at the limit of the values that were '
-               'tried; the true one may be beyond.')
+               'tried; the true one may be beyond')
 
 
 def _calibrated(diagnosis: Diagnosis, number: FittedNumber) -> str:

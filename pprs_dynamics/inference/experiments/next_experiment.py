@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -34,11 +33,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.experiments.motion_design import Motions, coarse_time, design
-from pprs_dynamics.inference.regression.base_columns import (
-    BaseColumn,
-    ModelNumber,
-    PresentParameter,
-)
+from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.sensitivities import Sensitivities, model_numbers
@@ -56,7 +51,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.system.json_records import JsonRecord
 
 SEPARATE, COMMISSION = 'separate', 'commission'
@@ -141,7 +135,6 @@ class FittedTerm:
         return rows
 
 
-@dataclass(frozen=True)
 class Information:
     """Gram matrices (P, P) of columns: base columns, then those of terms.
 
@@ -149,25 +142,25 @@ class Information:
     ----------
     given, model : DriveModel
         As the user has it; and around which forces are linear.
-    base : tuple of BaseColumn
-        Every base column that a motion may excite.
-    terms : tuple of FittedTerm
+    series : JointSeries
+        Any motion.
+    terms : sequence of FittedTerm
     noise : mapping of drive to NoiseSpectrum
         Other drives give no information.
+
+    Attributes
+    ----------
+    base : tuple of BaseColumn
+        Every base column that a motion may excite.
     """
 
-    given: DriveModel
-    model: DriveModel
-    base: tuple[BaseColumn, ...]
-    terms: tuple[FittedTerm, ...]
-    noise: Mapping[int, NoiseSpectrum]
-
-    @classmethod
-    def of(cls, given: DriveModel, model: DriveModel, series: JointSeries,
-           terms: Sequence[FittedTerm], noise: Mapping[int, NoiseSpectrum]) -> Information:
-        """Return the information of terms and of the base columns of any motion, such as one."""
-        found = cls(given, model, (), tuple(terms), noise)
-        return replace(found, base=found.on_motion(series).base)
+    def __init__(self, given: DriveModel, model: DriveModel, series: JointSeries,
+                 terms: Sequence[FittedTerm], noise: Mapping[int, NoiseSpectrum]) -> None:
+        self.model, self.terms, self.noise = model, tuple(terms), noise
+        self._sensitivities = Sensitivities(
+            model, given, {term.component.effect for term in terms}
+            | {type(effect) for effect in given.effects if isinstance(effect, CatalogueEffect)})
+        self.base = self.on_motion(series).base
 
     @property
     def noise_floor(self) -> float:
@@ -231,14 +224,6 @@ class Information:
         white = [whitened(rows, self.noise[d], design.residuals.period)
                  for d, rows in self.columns(design) if d in self.noise]
         return sum((rows @ rows.T for rows in white), np.zeros((self.size,) * 2))
-
-    @cached_property
-    def _sensitivities(self) -> Sensitivities:
-        return Sensitivities(
-            self.model, self.given, {term.component.effect for term in self.terms}
-            | {column.effect for column in self.base if isinstance(column, PresentParameter)}
-            | {type(effect) for effect in self.given.effects
-               if isinstance(effect, CatalogueEffect)})
 
 
 def _key(column: BaseColumn) -> str:
@@ -316,15 +301,12 @@ class Question:
     known : (P, P) array
         Information of recordings and tolerances.
     contests : tuple of Contest
-    subjects : tuple of str
-        Effects in question.
     """
 
     kind: str
     information: Information
     known: Array
     contests: tuple[Contest, ...]
-    subjects: tuple[str, ...]
 
     def after(self, series: JointSeries) -> Array:
         """Return what is known after a motion in addition to the recordings, (P, P)."""
@@ -366,7 +348,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
     joined = {(k, other): _on_drives_of(placed[k], placed[other])
               for n in range(1, len(placed)) for k, other in ((n, 0), (0, n))}
     every = [*terms, *joined.values()]
-    information = Information.of(
+    information = Information(
         fits.design.given, fits.design.model, motions.drawn(0, 1)[0],
         [term for group in every for term in group], fits.regression.noise(placed[0].fit))
     contests = []
@@ -380,7 +362,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival], motions: Motions) ->
             information.force(terms[true]) - certain, (*range(len(information.base)), *free),
             *sides, rows[refitted].cost - rows[true].cost))
     known = information.of_recordings(fits.design, fits.regression, placed[0].fit)
-    return Question(SEPARATE, information, known, tuple(contests), _names(terms[0]))
+    return Question(SEPARATE, information, known, tuple(contests))
 
 
 def _on_drives_of(fitted: CandidateSet, truth: CandidateSet) -> tuple[FittedTerm, ...]:
@@ -418,15 +400,15 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], motions: M
         regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
         fit = regression.fit(())
-        information = Information.of(model, model, series, terms, regression.noise(fit))
+        information = Information(model, model, series, terms, regression.noise(fit))
         known = information.of_recordings(design, regression, fit)
     else:
         largest = np.abs(model.drive_forces(series.motion(coarse_time(series))).total).max(axis=0)
-        information = Information.of(model, model, series, terms, {
+        information = Information(model, model, series, terms, {
             d: NoiseSpectrum(np.zeros(0), np.array([level ** 2]), BLOCK_DURATION)
             for d, level in enumerate(np.maximum(NOISE_SHARE * largest, 1e-9))})
         known = information.prior()
-    return Question(COMMISSION, information, known, _numbers(information), _names(terms))
+    return Question(COMMISSION, information, known, _numbers(information))
 
 
 def _common_terms(model: DriveModel) -> list[FittedTerm]:
@@ -452,10 +434,6 @@ def _common_terms(model: DriveModel) -> list[FittedTerm]:
         terms += [FittedTerm(Component.of(effect, None, {}, names),
                              np.array([scale[key] for key in names])) for names in most.values()]
     return terms
-
-
-def _names(terms: Sequence[FittedTerm]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(term.component.effect.name for term in terms))
 
 
 def _numbers(information: Information) -> tuple[Contest, ...]:
@@ -534,8 +512,6 @@ class Experiment(JsonRecord):
     ----------
     kind : {'separate', 'commission'}
         What the motion is for.
-    subjects : tuple of str
-        Effects in question.
     contests : tuple of ExpectedEvidence
         Expected evidence between every two of them.
     accuracies : tuple of Accuracy
@@ -550,23 +526,18 @@ class Experiment(JsonRecord):
     """
 
     json_keys = ('separates', 'does_not_separate', 'expected_evidence', 'load',
-                 'separated_by_load', 'question', 'subjects', 'text', 'contests', 'accuracy',
-                 'limits', 'duration', 'determined', 'total')
+                 'separated_by_load', 'question', 'text', 'contests', 'accuracy', 'limits',
+                 'duration', 'determined', 'total')
     json_attributes = (('question', 'kind'), ('accuracy', 'accuracies'))
     json_optional = ('determined', 'total')
 
     kind: str
-    subjects: tuple[str, ...]
     contests: tuple[ExpectedEvidence, ...]
     accuracies: tuple[Accuracy, ...]
     limits: dict[str, float]
     duration: float
     motion: Callable[[Array], PlatformMotion | JointMotion]
     model: DriveModel = field(repr=False)
-
-    def forces(self, time: Array) -> Forces:
-        """Return the model's forces along the motion at times [s]."""
-        return self.model.drive_forces(self.motion(time))
 
     @property
     def expected_evidence(self) -> float:
@@ -676,7 +647,7 @@ def design_experiment(question: Question, motions: Motions, seed: int,
     best = design(motions, motions.drawn(seed), question.worth, seed, progress)
     after = question.after(best)
     return Experiment(
-        question.kind, question.subjects, _expected(question, after), _accuracies(question, after),
+        question.kind, _expected(question, after), _accuracies(question, after),
         motions.uses(best), best.duration, lambda time: motions.sampled(best, time),
         question.information.model)
 

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -58,7 +57,7 @@ def read_reference(model: DriveModel, files: Sequence[RunFile] = (),
     """
     then = values_before_changes(model.values)
     if then != dict(model.values):
-        model = replace(DriveModel.from_parameters(then), source=model.source)
+        model = DriveModel.from_parameters(then, model.source)
     given = files or [file.path for file in _own(model)]
     runs = excerpts_within_memory(model, [
         run if isinstance(run, Recording) else with_mistakes(

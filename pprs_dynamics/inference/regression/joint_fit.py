@@ -111,7 +111,7 @@ class Regression:
                  open_forces: Mapping[int, OpenForces] = MappingProxyType({})) -> None:
         self.residuals, self.columns = residuals, tuple(base)
         self.bands = FrequencyBands.for_residuals(residuals)
-        self.noise_shapes = NoiseShapes.of(self.bands)
+        self.noise_shapes = NoiseShapes(self.bands)
         every = {d: DriveSeries(residuals, d, self.bands, open_forces.get(d))
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
         least = LEAST_SAMPLES if np.any(residuals.variables.get('velocity', 1)) else LEAST_POSES

@@ -35,11 +35,19 @@ FEW_PAIRS = 12
 LEAST_OPEN = 0.05  # variance of open forces over the noise's, below which a direction is known
 
 
-@dataclass(frozen=True)
 class FrequencyBands:
-    """Bands that all drives share; the first holds the constant of every record only.
+    """Bands from the constant to the Nyquist frequency, that all drives share.
+
+    The first holds the constant of every record only.
 
     Parameters
+    ----------
+    duration : float
+        Of the longest record [s].
+    period : float
+        Between samples [s].
+
+    Attributes
     ----------
     edges : (B + 1,) array
         Ascending, the first below 0 [Hz].
@@ -47,29 +55,15 @@ class FrequencyBands:
         At which the spectrum of a band is taken [Hz].
     """
 
-    edges: Array
-    frequency: Array
-
-    @classmethod
-    def of(cls, duration: float, period: float) -> FrequencyBands:
-        """Return bands from the constant to the Nyquist frequency.
-
-        Parameters
-        ----------
-        duration : float
-            Of the longest record [s].
-        period : float
-            Between samples [s].
-        """
+    def __init__(self, duration: float, period: float) -> None:
         step, highest = 0.5 / duration, 0.5 / period
         single = step * (np.arange(SINGLE_BANDS + 1) + 0.5)
         count = max(int(np.ceil(np.log(highest / single[-1]) / np.log(BAND_RATIO))), 1)
         wide = np.geomspace(single[-1], max(highest, 1.01 * single[-1]), count + 1)[1:]
-        edges = np.concatenate(([-step], single, wide))
-        edges[-1] = np.inf
-        centre = np.concatenate(([0.0], step * np.arange(1, SINGLE_BANDS + 1),
-                                 np.sqrt(wide * np.concatenate((single[-1:], wide[:-1])))))
-        return cls(edges, centre)
+        self.edges = np.concatenate(([-step], single, wide))
+        self.edges[-1] = np.inf
+        self.frequency = np.concatenate(([0.0], step * np.arange(1, SINGLE_BANDS + 1),
+                                         np.sqrt(wide * np.concatenate((single[-1:], wide[:-1])))))
 
     def __len__(self) -> int:
         return len(self.frequency)
@@ -80,7 +74,7 @@ class FrequencyBands:
         longest = max((residuals.time[record[-1].stop - 1] - residuals.time[record[0].start]
                        for drive in range(len(residuals.drives))
                        for record in _records(residuals, drive)), default=0.0)
-        return cls.of(float(longest) + residuals.period, residuals.period)
+        return cls(float(longest) + residuals.period, residuals.period)
 
 
 def _records(residuals: Residuals, drive: int) -> list[list[slice]]:
@@ -183,7 +177,7 @@ class DriveSeries:
         self._cuts[-1] = len(frequency)
         self.counts = np.diff(self._cuts).astype(float)
         self._single = int(np.argmax(np.append(self.counts, 0) != 1))  # bands of one coefficient
-        self._open = None if open_forces is None or not len(self) else _Narrowing.of(
+        self._open = None if open_forces is None or not len(self) else _Narrowing(
             open_forces.rows, self.cosines(open_forces.rows),
             np.sqrt(self.spread(open_forces.power)))
 
@@ -256,13 +250,19 @@ class DriveSeries:
         return np.repeat(by_band, self.counts.astype(int))
 
 
-@dataclass(frozen=True)
 class _Narrowing:
     """Open forces along their principal directions, in units of the noise.
 
     Parameters
     ----------
     rows : (K, M) array
+    cosines : (K, n) array
+        Their plain coefficients.
+    root : (n,) array
+        Of the noise's spectrum.
+
+    Attributes
+    ----------
     axes : (K, R) array
         Directions among the rows.
     values : (R,) array
@@ -271,21 +271,13 @@ class _Narrowing:
         Directions over and times the root of the noise's spectrum.
     """
 
-    rows: Array
-    axes: Array
-    values: Array
-    across: Array
-    along: Array
-
-    @classmethod
-    def of(cls, rows: Array, cosines: Array, root: Array) -> _Narrowing:
-        """Return that of rows with their plain coefficients (K, n) and a root spectrum (n,)."""
+    def __init__(self, rows: Array, cosines: Array, root: Array) -> None:
         white = cosines / root
         values, axes = np.linalg.eigh(white @ white.T)
         kept = values > LEAST_OPEN
-        values, axes = values[kept], axes[:, kept]
-        directions = axes.T @ white / np.sqrt(values)[:, None]
-        return cls(rows, axes, values, directions / root, directions * root)
+        self.rows, self.values, self.axes = rows, values[kept], axes[:, kept]
+        directions = self.axes.T @ white / np.sqrt(self.values)[:, None]
+        self.across, self.along = directions / root, directions * root
 
     def narrowed(self, coefficients: Array) -> Array:
         """Return coefficients (..., n) with what lies along open forces made smaller."""

@@ -67,11 +67,14 @@ LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: no spectru
 LEAST_POWER = 1e-24
 
 
-@dataclass(frozen=True)
 class NoiseShapes:
     """The shapes phi_j that a spectrum is made of, at the bands' frequencies, (J + 1, B).
 
     Parameters
+    ----------
+    bands : FrequencyBands
+
+    Attributes
     ----------
     corners : (J,) array
         f_j [Hz].
@@ -84,23 +87,16 @@ class NoiseShapes:
         Coefficients of one record in the bands.
     """
 
-    corners: Array
-    at_bands: Array
-    described: Array
-    counts: Array
-
-    @classmethod
-    def of(cls, bands: FrequencyBands) -> NoiseShapes:
-        """Return the shapes for some bands."""
+    def __init__(self, bands: FrequencyBands) -> None:
         lowest, highest = bands.frequency[1] / 2 ** OCTAVES_BELOW, bands.frequency[-1]
         count = max(int(np.floor(np.log2(highest / lowest))), 1)
-        corners = lowest * 2.0 ** np.arange(count)
-        shapes = _shapes(corners, bands.frequency)
+        self.corners = lowest * 2.0 ** np.arange(count)
+        self.at_bands = _shapes(self.corners, bands.frequency)
         numbers = bands.frequency[1:] / bands.frequency[1]
         falling = np.column_stack([2.0 ** (CONTINUED_OCTAVES * EXPONENTS),
                                    numbers ** -EXPONENTS[:, None]])
-        counts = np.diff(np.minimum(bands.edges, highest)) / bands.frequency[1]
-        return cls(corners, shapes, np.concatenate((shapes[1:], falling)), counts)
+        self.described = np.concatenate((self.at_bands[1:], falling))
+        self.counts = np.diff(np.minimum(bands.edges, highest)) / bands.frequency[1]
 
     @property
     def is_slow(self) -> np.typing.NDArray[np.bool_]:

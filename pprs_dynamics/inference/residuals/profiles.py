@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct
 
-from pprs_dynamics.arrays import Array, Integers
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
@@ -32,30 +32,11 @@ class Profile:
     mean, uncertainty : (K,) array
         Mean error and its standard deviation under the correlated noise [N]; NaN where a bin
         holds nothing.
-    samples : (K,) int array
     """
 
     edges: Array
     mean: Array
     uncertainty: Array
-    samples: Integers
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Power spectra of a drive's error and of its noise model.
-
-    Parameters
-    ----------
-    frequency : (F,) array
-        [Hz].
-    power, background : (F,) array
-        One-sided [N^2/Hz]; the background is the noise model's.
-    """
-
-    frequency: Array
-    power: Array
-    background: Array
 
 
 def error_profile(
@@ -76,21 +57,23 @@ def error_profile(
     place = bin_of(values, edges)
     known = np.isfinite(error)
     mean, spread = np.full((2, count), np.nan)
-    samples = np.zeros(count, dtype=int)
     # Variance of the coefficients of noise, of samples that may be means of the noise's.
     power = noise.power(np.arange(len(error)) / (2 * len(error) * residuals.period)) * (
         noise.period / residuals.period)
     for k in range(count):
         held = known & (place == k)
-        samples[k] = held.sum()
-        if samples[k]:
+        if held.any():
             mean[k] = error[held].mean()
-            spread[k] = np.sqrt(power @ dct(held.astype(float), norm='ortho') ** 2) / samples[k]
-    return Profile(edges, mean, spread, samples)
+            spread[k] = np.sqrt(power @ dct(held.astype(float), norm='ortho') ** 2) / held.sum()
+    return Profile(edges, mean, spread)
 
 
-def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Spectrum:
-    """Return the spectrum of the drive's error, averaged over its stretches, Hann window."""
+def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum,
+                   ) -> tuple[Array, Array, Array]:
+    """Return frequencies [Hz], and the power of the drive's error and of its noise there [N^2/Hz].
+
+    One-sided, averaged over its stretches, with a Hann window.
+    """
     from scipy.signal import welch
 
     stretches = residuals.stretches(drive)
@@ -106,8 +89,8 @@ def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Sp
                                      nperseg=size, detrend=False)
             powers.append(power)
             weights.append(part.stop - part.start)
-    return Spectrum(frequency, np.average(powers, axis=0, weights=weights),
-                    2 * noise.period * noise.power(frequency))
+    return (frequency, np.average(powers, axis=0, weights=weights),
+            2 * noise.period * noise.power(frequency))
 
 
 def bin_edges(values: Array, bins: int) -> Array:

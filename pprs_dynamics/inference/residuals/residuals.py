@@ -113,7 +113,13 @@ class Residuals:
         return self.measured - self.model
 
     def variable(self, name: str, drive: int) -> Array | None:
-        """Return a variable as that drive sees it, (M,), or None where it is unknown."""
+        """Return a variable as that drive sees it, (M,), or None where it is unknown.
+
+        Of another one `position of DRIVE`.
+        """
+        name, _, other = name.partition(' of ')
+        if other:
+            return self.variable(name, self.drives.index(other)) if other in self.drives else None
         if name == 'time':
             return self.time
         if name == 'direction' and name not in self.variables:

@@ -22,7 +22,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.search.candidates import REVERSAL, CandidateSet
+from pprs_dynamics.inference.search.candidates import REVERSAL, SINCE, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -85,12 +85,17 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Dr
 def fitted_model(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the given model with the effects of a set, and its numbers as the fit moves them.
 
+    Of effects with a course, with those that are there at the end and stay.
+
     Raises
     ------
     ModelError
         For values that no model may have.
     """
-    return model_at(fits.design, *parts_of(fits, fitted))
+    base, effects = parts_of(fits, fitted)
+    return model_at(fits.design, base, [effect for effect, component in zip(
+        effects, fitted.blocks, strict=True)
+        if component.course is None or component.course.kind == SINCE])
 
 
 def squared(fits: FittedSets, fitted: CandidateSet, forces: Array) -> float:

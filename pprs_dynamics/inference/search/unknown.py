@@ -245,9 +245,7 @@ class DrivePatterns:
 
     def values(self, variable: str) -> Array:
         """Return a variable by its name in the interface, also one of another drive, (n,)."""
-        name, _, other = variable.partition(' of ')
-        drive = self.residuals.drives.index(other) if other else self.d
-        values = self.residuals.variable(name, drive)
+        values = self.residuals.variable(variable, self.d)
         assert values is not None
         return values
 
