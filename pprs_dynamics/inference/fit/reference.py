@@ -188,17 +188,20 @@ class Process:
         rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
         return cls(drive, states, at[rows], factor[rows], slides), factor
 
-    def known(self, q: Array, v: Array, _: float) -> Array:
-        """Return the features of the process in a motion, (M, R); see `Waves.known`."""
+    def at(self, q: Array, v: Array, _: float) -> Array:
+        """Return the states in a motion, (M, k); see `Waves.at`."""
+        return self.states.at(q, v, self.drive, self.slides)
+
+    def known(self, at: Array) -> Array:
+        """Return the features of the process at states, (M, R)."""
         from scipy.linalg import solve_triangular  # here: commands start without it
 
-        at = self.states.at(q, v, self.drive, self.slides)
         known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
         return known
 
-    def new(self, q: Array, v: Array, known: Array) -> Array:
+    def new(self, at: Array, known: Array) -> Array:
         """Return features of states that it does not know, (M, r), orthogonal to the known ones."""
-        return factor_of(self.states.at(q, v, self.drive, self.slides), MOST_NEW, known)[1]
+        return factor_of(at, MOST_NEW, known)[1]
 
 
 @dataclass(frozen=True)
@@ -237,31 +240,33 @@ class Waves:
                 -WAVE_STEP, WAVE_STEP, FINE_STEP)
             at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
             found = cls(drive, np.append(found.numbers, at))
-            features = found.known(*motion_of(residuals), residuals.period)[known]
+            features = found.known(found.at(*motion_of(residuals), residuals.period)[known])
             rest = left - features @ np.linalg.lstsq(features, left)[0]
         return found
 
-    def known(self, q: Array, v: Array, period: float) -> Array:
-        """Return the features of the waves in a motion, (M, 4 K).
-
-        Means over a sample, in which the wave turns on.
+    def at(self, q: Array, v: Array, period: float) -> Array:
+        """Return positions and ways within a sample, (M, 2).
 
         Parameters
         ----------
         q, v : (M, D) array
         period : float
-            Of a sample [s]; 0 where it is no mean.
+            Of a sample [s]; 0 where the force is no mean over it.
         """
-        q, v = q[:, self.drive, None], v[:, self.drive, None]
+        return np.stack((q[:, self.drive], v[:, self.drive] * period), axis=1)
+
+    def known(self, at: Array) -> Array:
+        """Return the features of the waves, (M, 4 K): means over a sample, in which they turn on.
+        """
         numbers = np.concatenate((self.numbers, 2 * self.numbers))
-        mean = np.sinc(numbers * v * period / (2 * np.pi))
-        phase = numbers * q
+        mean = np.sinc(numbers * at[:, 1:] / (2 * np.pi))
+        phase = numbers * at[:, :1]
         found: Array = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
         return found
 
-    def new(self, q: Array, _: Array, __: Array) -> Array:
+    def new(self, at: Array, _: Array) -> Array:
         """Return none: it knows every position."""
-        return np.zeros((len(q), 0))
+        return np.zeros((len(at), 0))
 
 
 Processes = tuple[tuple[Process | Waves, ...], ...]
@@ -324,7 +329,7 @@ class Reference:
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
         processes = _processes(residuals, columns, measured)
-        features = _features(processes, *motion_of(residuals), residuals.period)
+        features = _features(processes, _at(processes, *motion_of(residuals), residuals.period))
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
         size = np.stack([fits[d][0] if d in fits else np.full(len(features[d]), LEAST_SIZE)
                          for d in drives])
@@ -354,15 +359,16 @@ class Reference:
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
                       ) -> CarriedOver:
         q, v = motion_of(residuals)
-        known = _features(self.processes, q, v, residuals.period)
-        shared = self.processes[0][0].new(q, v, known[0][0])
+        at = _at(self.processes, q, v, residuals.period)
+        known = _features(self.processes, at)
+        shared = self.processes[0][0].new(at[0][0], known[0][0])
         numbers, _ = _base(self.model, reconstructions, residuals.measured, self.base)
         count = numbers.shape[2]
         of_base = numbers @ self.fit.coefficients[:count]
         together, apart = [], []
         for d, place in enumerate(self._places(known)):
-            new = [shared, *(process.new(q, v, features) for process, features in zip(
-                self.processes[d][1:], known[d][1:], strict=True))]
+            new = [shared, *(process.new(states, features) for process, states, features in zip(
+                self.processes[d][1:], at[d][1:], known[d][1:], strict=True))]
             here, repeats = np.concatenate(known[d], axis=1), self.repeats[d]
             together.append(numbers[:, d] @ self.root[:count] + repeats * here @ self.root[place])
             apart.append(np.concatenate((
@@ -382,10 +388,10 @@ class Reference:
         return [slice(int(start), int(end)) for start, end in pairwise(ends)]
 
     def _repeating(self, q: Array, v: Array, period: float) -> Array:
-        """Return the forces that repeat beyond those of the base, (M, D) [N]; see `Waves.known`."""
-        found = np.zeros_like(q)
+        """Return the forces that repeat beyond those of the base, (M, D) [N]; see `Waves.at`."""
+        found, at = np.zeros_like(q), _at(self.processes, q, v, period)
         for rows in (slice(start, start + CHUNK) for start in range(0, len(q), CHUNK)):
-            known = _features(self.processes, q[rows], v[rows], period)
+            known = _features(self.processes, [[states[rows] for states in own] for own in at])
             for d, place in enumerate(self._places(known)):
                 found[rows, d] = self.repeats[d] * (
                     np.concatenate(known[d], axis=1) @ self.fit.coefficients[place])
@@ -452,10 +458,17 @@ def _base(model: DriveModel, found: Sequence[Reconstruction], efforts: Array,
     return numbers @ prior, prior
 
 
-def _features(processes: Processes, q: Array, v: Array, period: float) -> list[list[Array]]:
-    """Return the features of each drive's processes in a motion, (M, k) each."""
-    shared = processes[0][0].known(q, v, period)
-    return [[shared, *(process.known(q, v, period) for process in own)] for _, *own in processes]
+def _at(processes: Processes, q: Array, v: Array, period: float) -> list[list[Array]]:
+    """Return the states of each drive's processes in a motion, which may remember, (M, k) each."""
+    shared = processes[0][0].at(q, v, period)
+    return [[shared, *(process.at(q, v, period) for process in own)] for _, *own in processes]
+
+
+def _features(processes: Processes, at: Sequence[Sequence[Array]]) -> list[list[Array]]:
+    """Return the features of each drive's processes at states, (M, k) each."""
+    shared = processes[0][0].known(at[0][0])
+    return [[shared, *(process.known(states) for process, states in zip(
+        own, there[1:], strict=True))] for (_, *own), there in zip(processes, at, strict=True)]
 
 
 def _base_columns(columns: Array, drives: Sequence[int]) -> list[BaseColumn]:
