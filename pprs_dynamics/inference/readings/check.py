@@ -22,7 +22,7 @@ from pprs_dynamics.inference.readings.evidence import (
     Evidence,
     Likelihood,
     in_reading,
-    mounting_in,
+    mountings_in,
     read_motion,
 )
 from pprs_dynamics.inference.readings.findings import (
@@ -59,21 +59,19 @@ class Fit:
     reading : Reading
     score : float
         [nats].
-    residual, largest_residual : float
-        Mean residual and the largest of a drive, over the squared effort.
-    prior, mean_prior : float
-        Largest and weighted mean prior cost of a drive [nats].
-    least_residual : float
-        Smallest residual of a drive.
+    residuals, priors : sequence of float
+        Of each drive whose efforts count: residual over the squared effort, and prior cost [nats].
     """
 
     reading: Reading
     score: float = 0.0
-    residual: float = 1.0
-    largest_residual: float = 1.0
-    prior: float = 0.0
-    least_residual: float = 1.0
-    mean_prior: float = 0.0
+    residuals: Sequence[float] = (1.0,)
+    priors: Sequence[float] = (0.0,)
+
+    @property
+    def residual(self) -> float:
+        """Geometric mean of the residuals."""
+        return float(np.exp(np.mean(np.log(self.residuals))))
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -248,19 +246,20 @@ class Search:
         self.start = start = self._top()
         # Without masses a gravity of any size may explain positions in another unit.
         explains = not start.reading.kinds - {'rate'} and np.all(
-            start.reading.effort_scale == 1) and self.has_gain and start.prior < table.PLAUSIBLE
-        if explains and start.largest_residual < table.CLOSE_FIT:
+            start.reading.effort_scale == 1) and self.has_gain and (
+                max(start.priors) < table.PLAUSIBLE)
+        if explains and max(start.residuals) < table.CLOSE_FIT:
             self.explains = True  # hardly anything may be explained better
             return start
         # Efforts that are explained may still be amperes of motion in turns, nearly 2 pi less.
-        self.explains = bool(explains and start.largest_residual < table.EXPLAINED)
+        self.explains = bool(explains and max(start.residuals) < table.EXPLAINED)
         tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST} - (
-            set() if self.has_gain else {*table.LACKING})
+            set() if self.has_gain else {'mounting', *table.LACKING})
         seed = None
         while self._top() is not seed:
             seed = self._top()
-            self._extend(seed, (*self.rows[1:], *self.mounting(seed.reading),
-                                *self._rates(seed.reading)), tried)
+            mountings = mountings_in(self.model, self.excerpt(seed.reading), seed.reading)
+            self._extend(seed, (*self.rows[1:], *mountings, *self._rates(seed.reading)), tried)
             # Of two zeros that are off, one alone may explain little.
             zeros = [fit for fit in self.fits if fit.reading.kinds == {'position_offset'}]
             if seed is start and zeros:
@@ -300,12 +299,6 @@ class Search:
         if negated and not np.any(np.isfinite(negated)):
             rivals = rivals or self.fits[:1]
         return [best, *rivals] if not best.reading.is_plain or (self.is_first and rivals) else []
-
-    def mounting(self, before: Reading) -> list[Reading]:
-        """Return the row with the gravity that explains what another reading does not."""
-        row = None if 'mounting' in before.kinds or not self.has_gain else (
-            mounting_in(self.model, self.excerpt(before), before))
-        return [] if row is None else [row]
 
     def _rates(self, before: Reading) -> Iterator[Reading]:
         """Yield rows with times of which the recorded velocities are the derivatives.
@@ -360,7 +353,7 @@ class Search:
         if row.kind == 'drive_order':
             return fit.residual < table.BETTER_ORDER * self.start.residual
         # Masses that inertia contradicts are guesses, and so is their weight.
-        if row.kind == table.WITHOUT_GRAVITY and fit.prior > table.PLAUSIBLE:
+        if row.kind == table.WITHOUT_GRAVITY and max(fit.priors) > table.PLAUSIBLE:
             return False
         evidence = self.evidence(fit.reading)
         # Without weight, masses that are off look like another rate.
@@ -407,7 +400,7 @@ class Search:
             return []
         cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
         if not np.isfinite(excerpt.effort).any():
-            return [Fit(reading, -cost, table.GOOD_FIT)]
+            return [Fit(reading, -cost, (table.GOOD_FIT,))]
         evidence = self.evidence(reading)
         # A mounting without weight explains none, and an external torque lacks more than inertia.
         if evidence is None or ((reading.gravity is not None or reading.contains == table.LACKING[
@@ -428,8 +421,7 @@ class Search:
             # A guess of one mass is a guess of all.
             return Fit(replace(reading, effort_scale=scales),
                        float(np.sum(score + prior) - prior.max()) - cost - price,
-                       float(np.exp(np.mean(np.log(residual)))), float(residual.max()),
-                       float(prior.max()), float(residual.min()), float(np.mean(prior)))
+                       residual.tolist(), prior.tolist())
 
         negated = [d for d in measured if likelihood(d, -1.0).score - likelihood(d, 1.0).score > (
             table.COST['effort_sign'])]
@@ -441,7 +433,7 @@ class Search:
         if {'position_offset', 'position_unit', 'mounting', 'load'} & {
                 part.kind for part in reading.parts}:
             # Another weight is credible only for efforts that show weight or inertia.
-            fits = [fit for fit in fits if fit.mean_prior <= table.PLAUSIBLE]
+            fits = [fit for fit in fits if np.mean(fit.priors) <= table.PLAUSIBLE]
         return fits
 
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],

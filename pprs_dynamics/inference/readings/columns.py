@@ -55,8 +55,6 @@ from pprs_dynamics.system.plain_text import counted
 Written = Mapping[tuple[str, str], Column | float]
 Columns = dict[tuple[str, str], Column]
 TIME_WORDS = {'time', *TIME_LIKE}
-SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
-              CURRENT: 'effort_scale'}
 
 
 class GuessError(PprsError, ValueError):
@@ -167,7 +165,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
             f'no names of columns say that they are {main}s: ' + ', '.join(
                 item.title or str(item.column) for item in left[:12])
             + f'; write them into columns, e.g. {{{joints[0]}: {{{main}: {example}}}}}')
-    scales = {(joint, SCALE_KEYS[kind]): scale for (joint, kind), column in columns.items()
+    scales = {(joint, f'{EFFORT if kind == CURRENT else kind}_scale'): scale
+              for (joint, kind), column in columns.items()
               if (scale := scale_of(by_column[column].title, kind)) is not None}
     bare = [joint for joint, item in found.items() if unit_of(item.title) is None]
     turn = min((turn_of(found[joint].values) for joint in bare), default=np.inf)
@@ -379,7 +378,7 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array | N
     if rivals:
         raise AmbiguousColumns([{**stamp, **read(other.blocks)} for other in (layout, rivals[0])],
                                'two readings of the columns are possible')
-    if best.least_residual < table.NO_EFFORT < best.largest_residual:
+    if min(best.residuals) < table.NO_EFFORT < max(best.residuals):
         layout.blocks.pop(EFFORT, None)  # a column is the effort of one joint, another one is not
     if len(series) == count and not count % 2:
         half = [(joint, kind) for kind in (POSITION, EFFORT) for joint in joints[:count // 2]]

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import comb
 from typing import Any, NamedTuple
@@ -180,7 +181,7 @@ class Evidence:
             return np.nan
         root = self.roots[drive, column]
         rigid = root[:, INERTIA] + root[:, GRAVITY]
-        others = root[:, [VELOCITY, DIRECTION] + [CONSTANT] * (not _is_steady(root, rigid))]
+        others = root[:, [VELOCITY, DIRECTION, CONSTANT]]
         pair = np.column_stack([rigid, root[:, EFFORT]])
         beyond, effort = (pair - others @ np.linalg.lstsq(others, pair, rcond=CONDITION)[0]).T
         size = float(np.linalg.norm(beyond))
@@ -213,13 +214,6 @@ def _balance(model: DriveModel, position: Array) -> Array:
     balance: Array = np.sqrt(np.maximum(np.sum(weights ** 2, axis=(0, 2)) / np.where(
         all_of_them > 0, all_of_them, np.inf), 1.0))
     return balance
-
-
-def _is_steady(root: Array, force: Array) -> bool:
-    """Return whether a force of the regression hardly changes: it is a constant."""
-    ones = root[:, CONSTANT]
-    size, mean = float(force @ force), float(force @ ones) / max(float(ones @ ones), 1e-300)
-    return size - mean ** 2 * float(ones @ ones) < table.STEADY ** 2 * size
 
 
 def gravity_key(model: DriveModel) -> str:
@@ -264,58 +258,56 @@ def forces_of(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     return np.stack([rigid[0] - rigid[1], rigid[1], others])
 
 
-def mounting_in(model: DriveModel, excerpt: Excerpt, reading: Reading) -> Reading | None:
-    """Return the row of the table with the gravity that explains the efforts of a reading.
+def mountings_in(model: DriveModel, excerpt: Excerpt, reading: Reading) -> Iterator[Reading]:
+    """Yield the row of the table with the gravity that explains the efforts of a reading.
 
     Efforts, in any unit, are fitted with a free gravity vector, and each drive's inertia, friction
-    and offset. None where the direction is the model's, or explains the efforts of some drive not
-    much better.
+    and offset. Nothing where the direction is the model's, or explains the efforts of some drive
+    not much better.
     """
     given = np.asarray(model.values[gravity_key(model)], dtype=float)
     size = float(np.linalg.norm(given))
     if size == 0:
-        return None
+        return
     motion = read_motion(excerpt.motion, reading)
     try:
         (_, nothing, _), *weights = (forces_of(in_reading(model, replace(
             reading, gravity=gravity)), motion, excerpt.time)
             for gravity in (np.zeros(3), *size * np.eye(3)))
     except (PprsError, np.linalg.LinAlgError):  # what the mechanism cannot follow
-        return None
+        return
     columns = np.stack([weight - nothing for _, weight, _ in weights], axis=2)
     v, a, inertia = motion.velocity, motion.acceleration, weights[0][0]
     own = np.stack((v, np.sign(v), a, np.ones_like(v), inertia), axis=2)
-    rows, targets = [], []
+    parts = []
     for d, effort in enumerate(excerpt.effort[:, reading.efforts].T):
         at = np.isfinite(effort)
-        y = np.column_stack((effort[at], columns[at, d]))
+        y = np.column_stack((columns[at, d], effort[at]))
         # What the drive's inertia, friction and offset do not explain.
         rest = y - own[at, d] @ np.linalg.lstsq(own[at, d], y, rcond=None)[0]
-        if np.any(rest[:, 0]) and np.any(rest[:, 1:]):
-            rest /= root_mean_square(rest[:, 0])
-            rows.append(rest[:, 1:])
-            targets.append(rest[:, 0])
-    if not rows:
-        return None
-    G, target = np.concatenate(rows), np.concatenate(targets)
-    share = np.linalg.lstsq(G, target, rcond=1e-3)[0]
-    along = G @ given
-    same = given * max(float(along @ target), 0.0) / max(float(along @ along), 1e-300)
+        if np.any(rest[:, :3]) and np.any(rest[:, 3]):
+            parts.append(rest / root_mean_square(rest[:, 3]))
+    if not parts:
+        return
+    found = np.concatenate(parts)
+    share = np.linalg.lstsq(found[:, :3], found[:, 3], rcond=1e-3)[0]
+    along = found[:, :3] @ given
+    same = given * max(float(along @ found[:, 3]), 0.0) / max(float(along @ along), 1e-300)
     is_explained = all(
-        np.sum((target - G @ share) ** 2) < table.MOST_LEFT * np.sum((target - G @ same) ** 2)
-        for G, target in zip(rows, targets, strict=True))
+        np.sum((part @ [*-share, 1]) ** 2) < table.MOST_LEFT * np.sum((part @ [*-same, 1]) ** 2)
+        for part in parts)
     norm = float(np.linalg.norm(share))
     if not is_explained or _angle(share, given) < table.LEAST_TILT:
-        return None
+        return
     largest = np.argmax(np.abs(share))
     axis = np.sign(share[largest]) * np.eye(3)[largest]
     gravity = size * axis if _angle(share, axis) < table.ALONG else (size / norm * share).round(1)
-    found, known = (', '.join(f'{value + 0.0:g}' for value in vector)
+    shown, known = (', '.join(f'{value + 0.0:g}' for value in vector)
                     for vector in (gravity, given))
-    return replace(
+    yield replace(
         Reading.plain(len(model.drives)), kind='mounting', gravity=gravity,
         drives=tuple(range(len(model.drives))), cost=table.COST['mounting'],
-        what=f'gravity in the base is ({found}) m/s² in this recording and ({known}) m/s² in the '
+        what=f'gravity in the base is ({shown}) m/s² in this recording and ({known}) m/s² in the '
         'model: the robot is mounted in another direction')
 
 

@@ -29,10 +29,6 @@ from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 from pprs_dynamics.system.plain_yaml import as_yaml
 
 KINDS = {recorded_names.COMMANDED: table.COMMAND, recorded_names.EXTERNAL: table.EXTERNAL}
-# What efforts are, as a model file says it, by what they look like.
-LINES = {table.COMMAND: recorded_names.COMMANDED, table.POSITION_ERROR: recorded_names.COMMANDED,
-         table.EXTERNAL: recorded_names.EXTERNAL,
-         table.WITHOUT_GRAVITY: recorded_names.WITHOUT_GRAVITY}
 Scale = tuple[str, str, float | str | int]  # drive, key below `columns`, value
 Scales = tuple[Scale, ...]
 
@@ -134,12 +130,12 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
             changes = _order_scales(model, recording, reading)
         if part.gravity is not None:
             line, changes = gravity_line(model, part.gravity), ()
-        if part.kind in LINES:
+        if part.kind in table.LACKING:
             columns = model.recorded.columns
             what = part.what if part.kind != table.COMMAND or not (columns and columns.rate) else (
                 f'{part.what}; or there are fewer samples per second than {columns.rate:g}')
             found.append(NoMeasurement.of(part.kind, drives, every, what,
-                                          f'{EFFORT_KIND}: {LINES[part.kind]}'))
+                                          f'{EFFORT_KIND}: {table.LACKING[part.kind][1]}'))
         elif part.what:
             found.append(OtherReading.of(part.kind, drives, part.drives, part.what, line,
                                          scales=changes))
@@ -154,7 +150,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
         found.append(NoMeasurement.of(
             table.POSITION_ERROR, drives, every, f'the effort of {named(drives, every)} is '
             f'{scales[0]:.2g} times what the model says: it looks like an error of position under '
-            'the effort, or is in another unit', f'{EFFORT_KIND}: {LINES[table.POSITION_ERROR]}'))
+            'the effort, or is in another unit', f'{EFFORT_KIND}: {recorded_names.COMMANDED}'))
     elif not np.all(np.isin(scales, table.SCALES)):
         listed = ', '.join(f'{scale:.3g} ({drive})' for drive, scale in zip(
             drives, scales, strict=True) if scale != 1)

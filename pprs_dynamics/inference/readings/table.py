@@ -22,6 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
+from pprs_dynamics.physics.model import recorded_names
 
 # ------------------------------------------------------------------------------------- units
 
@@ -51,16 +52,17 @@ QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
 COMMAND, POSITION_ERROR, EXTERNAL = 'command', 'position_error', 'external'
 WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
 # What they contain of the model's inertia, gravity and friction, and of friction that grows with
-# the velocity and by its direction, and what they look like.
-LACKING: dict[str, tuple[tuple[int, ...], str]] = {
-    COMMAND: ((0, 1, 0, 0, 0), 'no inertia nor friction: it looks like what a controller '
-              'commands, not like a measurement'),
-    POSITION_ERROR: ((0, 0, 0, 1, 0), 'no inertia nor gravity: it looks like an error of position, '
-                     'which grows with the velocity, not like a measurement'),
-    WITHOUT_GRAVITY: ((1, 0, 1, 1, 1), 'no gravity: it looks as if gravity was already '
-                      'subtracted, or a counterweight bears it'),
-    EXTERNAL: ((0, 0, 1, 1, 1), 'no inertia nor gravity: it looks like an external torque, from '
-               'which a model was already subtracted')}
+# the velocity and by its direction, how a model file calls them, and what they look like.
+LACKING: dict[str, tuple[tuple[int, ...], str, str]] = {
+    COMMAND: ((0, 1, 0, 0, 0), recorded_names.COMMANDED, 'no inertia nor friction: it looks like '
+              'what a controller commands, not like a measurement'),
+    POSITION_ERROR: ((0, 0, 0, 1, 0), recorded_names.COMMANDED, 'no inertia nor gravity: it looks '
+                     'like an error of position, which grows with the velocity, not like a '
+                     'measurement'),
+    WITHOUT_GRAVITY: ((1, 0, 1, 1, 1), recorded_names.WITHOUT_GRAVITY, 'no gravity: it looks as if '
+                      'gravity was already subtracted, or a counterweight bears it'),
+    EXTERNAL: ((0, 0, 1, 1, 1), recorded_names.EXTERNAL, 'no inertia nor gravity: it looks like an '
+               'external torque, from which a model was already subtracted')}
 LARGEST_COMPLIANCE = 0.01  # [rad/(N m), m/N]: controllers are stiffer than 100 N m/rad
 LEAST_NOISE = 1e-5  # over the swing of an effort, of real sensors
 LEAST_MEANS, STRETCHES = 50, 8  # of an excerpt; evenly over the recording
@@ -85,7 +87,7 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
         'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
         'effort_absolute': 6.0, 'load': 1.0, 'drive_constant': 10.0, 'velocity_unit': 6.0,
         COMMAND: 4.0, POSITION_ERROR: 3.0, WITHOUT_GRAVITY: 4.0, EXTERNAL: 4.0}
-UNLIKE_VELOCITY = 6.0  # of units of positions that suit no unit of the recorded velocities
+UNLIKE_VELOCITY = 7.0  # of units of positions that suit no unit of the recorded velocities
 UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
 RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
@@ -124,19 +126,16 @@ NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion
 # ----------------------------------------------------------------------- columns by their names
 
 POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
-# Words of a title, by the quantity that they name.
+# Words of a title, by the quantity that they name; plurals with s are split into these.
 WORDS = {
-    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'phi', 'qpos',
-               'enc', 'encoder', 'ticks', 'th', 'winkel', 'lage', 'stellung', 'hub', 'weg'),
+    POSITION: ('position', 'pos', 'q', 'angle', 'theta', 'phi', 'qpos', 'enc', 'encoder', 'ticks',
+               'th', 'winkel', 'lage', 'stellung', 'hub', 'weg'),
     VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
                'omega', 'qvel', 'dpos', 'v', 'thd', 'dth', 'drehzahl', 'geschwindigkeit'),
-    EFFORT: ('effort', 'efforts', 'eff', 'tau', 'torque', 'torques', 'trq', 'torq', 'force',
-             'moment', 'mom', 'load', 'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment',
-             'f'),
-    CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
-              'strom'),
-    'temperature': ('temperature', 'temperatures', 'temp', 'temps'),
-    'pressure': ('pressure', 'pressures'),
+    EFFORT: ('effort', 'eff', 'tau', 'torque', 'trq', 'torq', 'force', 'moment', 'mom', 'load',
+             'tq', 'qfrc', 'u', 'kraft', 'drehmoment', 'f'),
+    CURRENT: ('current', 'cur', 'curr', 'amp', 'ampere', 'i', 'iq', 'strom'),
+    'temperature': ('temperature', 'temp'), 'pressure': ('pressure',),
 }
 # Words of a position, where no word names a quantity.
 OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
@@ -161,15 +160,16 @@ MEASURED = frozenset((
     'link'))
 TIME, SHARE, NEITHER = 'time', 'share', 'neither'
 # Units in titles, in lower case and without signs between their letters, and their factors to SI.
+OF_POSITION = {
+    'rad': 1.0, 'mrad': 1e-3, 'm': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'um': 1e-6, 'µm': 1e-6,
+    **dict.fromkeys(('deg', '°', 'grad', 'degree', 'degrees'), math.pi / 180),
+    **dict.fromkeys(('rev', 'revs', 'turn', 'turns'), 2 * math.pi),
+    **dict.fromkeys(('radian', 'radians'), 1.0)}
 UNITS = {
-    POSITION: {'rad': 1.0, 'mrad': 1e-3, 'm': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'um': 1e-6, 'µm': 1e-6,
-               **dict.fromkeys(('deg', '°', 'grad', 'degree', 'degrees'), math.pi / 180),
-               **dict.fromkeys(('rev', 'revs', 'turn', 'turns'), 2 * math.pi),
-               **dict.fromkeys(('radian', 'radians'), 1.0)},
-    VELOCITY: {'rad/s': 1.0, 'm/s': 1.0, 'mm/s': 1e-3, 'cm/s': 1e-2,
+    POSITION: OF_POSITION,
+    VELOCITY: {**{f'{unit}/s': factor for unit, factor in OF_POSITION.items()}, 'mms': 1e-3,
                **dict.fromkeys(('rpm', '1/min', 'u/min', 'rev/min'), math.pi / 30),
-               **dict.fromkeys(('deg/s', '°/s', 'grad/s', 'degs', 'dps'), math.pi / 180),
-               **dict.fromkeys(('rev/s', 'turn/s', 'turns/s'), 2 * math.pi), 'mms': 1e-3},
+               **dict.fromkeys(('degs', 'dps'), math.pi / 180)},
     EFFORT: {'n': 1.0, 'nm': 1.0, 'mn': 1e-3, 'mnm': 1e-3, 'nmm': 1e-3, 'ncm': 1e-2, 'kn': 1e3,
              'knm': 1e3, 'kgf': 9.80665, 'kgfm': 9.80665, 'lbfin': 0.1129848, 'inlb': 0.1129848,
              **dict.fromkeys(('kgfcm', 'kgcm'), 0.0980665),
@@ -182,8 +182,7 @@ UNITS = {
            **dict.fromkeys(('us', 'µs', 'usec', 'micros', 'microseconds'), 1e-6),
            **dict.fromkeys(('ns', 'nsec', 'nanosec', 'nanoseconds'), 1e-9)},
     'temperature': dict.fromkeys(('°c', 'c', 'degc', 'k'), 1.0), 'pressure': {'bar': 1.0},
-    NEITHER: dict.fromkeys(('v', 'w', 'hz', 'j', 'm/s2', 'rad/s2', 'deg/s2', 'mm/s2', '°/s2'),
-                           1.0)}
+    NEITHER: dict.fromkeys(('v', 'w', 'hz', 'j', *(f'{unit}/s2' for unit in OF_POSITION)), 1.0)}
 
 # --------------------------------------------------------------------- columns by their numbers
 
@@ -361,7 +360,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         add('effort_absolute', f'the effort of {named(drives, every)} looks like its absolute '
             'value: it is never below 0, where the model changes sign; it must be recorded with '
             'its sign', every, are_unsigned=True)
-    for kind, (contains, what) in LACKING.items():
+    for kind, (contains, _, what) in LACKING.items():
         add(kind, f'the effort of {named(drives, every)} contains {what}', every,
             contains=contains)
     for k in (k for k in every if units[k].turns):
