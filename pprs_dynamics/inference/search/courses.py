@@ -106,15 +106,16 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone) -> bool:
         effects = (*filter(_is_new, reported.effects), *(candidate for _, candidate in alone))
         for fitted in _of_one_cause(fits, best, (
                 other for other in effects if not changing.isdisjoint(other.drives or changing))):
-            fits.pruned(fits.evaluate(_refined(fits, fitted).candidates))
+            fits.pruned(fits.refined(fits.evaluate(_refined(fits, fitted).candidates)))
     return bool(drives)
 
 
 def fit_curves(first: FittedSets, last: FittedSets, best: CandidateSet) -> bool:
-    """Fit friction that depends on the position in any way, where an event is in the best set.
+    """Fit friction that depends on the position in any way, where the best set may be such a curve.
 
-    What returns at the same place, in the same direction, is no event. Only there are such curves
-    tried: they imitate any friction. Return whether any was.
+    What returns at the same place, in the same direction, is no event, and may be no pattern over
+    the position alone. Only in place of these are such curves tried: they imitate any friction.
+    Return whether any was.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def fit_curves(first: FittedSets, last: FittedSets, best: CandidateSet) -> bool:
         Around the input model, for sets without a nonlinear effect, and around the last model.
     best : CandidateSet
     """
-    drives = sorted({d for candidate in best.candidates if _is_event(candidate)
+    drives = sorted({d for candidate in best.candidates if _may_be_curve(candidate)
                      for d in candidate.drives or last.regression.drives})
     for effects in dict.fromkeys((best.effects, tuple(
             effect for effect in best.effects if not effect.course), ())) if drives else ():
@@ -136,9 +137,9 @@ def fit_curves(first: FittedSets, last: FittedSets, best: CandidateSet) -> bool:
     return bool(drives)
 
 
-def _is_event(candidate: Candidate) -> bool:
-    return (candidate.family.variable == 'time' if isinstance(candidate, UnknownCandidate)
-            else candidate.course is not None)
+def _may_be_curve(candidate: Candidate) -> bool:
+    return (candidate.family.variable in ('time', 'position')
+            if isinstance(candidate, UnknownCandidate) else candidate.course is not None)
 
 
 def _curve(fits: FittedSets, d: int) -> UnknownCandidate | None:
