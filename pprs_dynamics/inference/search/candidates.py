@@ -29,8 +29,8 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
-# Kinds of nuisance columns: how friction reverses, and deviations of forms.
-REVERSAL, FORM = 'reversal', 'form'
+# Kinds of nuisance columns: how friction reverses, deviations that effects declare, and any others.
+REVERSAL, FORM, WAVES = 'reversal', 'form', 'waves'
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regr
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.nuisance_columns import (
     deviation_rows,
+    form_rows,
     joint_reversal_rows,
     reversal_rows,
 )
@@ -27,6 +28,7 @@ from pprs_dynamics.inference.search.body_centres import about_centre, find_centr
 from pprs_dynamics.inference.search.candidates import (
     FORM,
     REVERSAL,
+    WAVES,
     Candidate,
     CandidateSet,
     Component,
@@ -325,8 +327,11 @@ class Components:
             units = np.stack([component.every(unit)
                               for unit in np.eye(max(len(component.names), 1))])
             kinds = {REVERSAL: joint_reversal_rows(self.design, term, component.names)} if (
-                d is None) else {kind: {d: rows(self.design, term, units)} for kind, rows in (
-                    (REVERSAL, reversal_rows), (FORM, deviation_rows))}
+                d is None) else {
+                    REVERSAL: {d: reversal_rows(self.design, term, units)},
+                    FORM: {d: deviation_rows(self.design, term, units)},
+                    WAVES: {d: form_rows(self.design, term, units,
+                                         self.prior_costs.decisions.form_share)}}
             weight = 1.0 if component.course is None else self._weight(component.course)
             self._nuisance[component] = {kind: transformed for kind, rows in kinds.items() if (
                 transformed := {

@@ -19,6 +19,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
+    WAVES,
     Candidates,
     CandidateSet,
     Component,
@@ -140,7 +141,14 @@ class FittedSets:
             # exact: the noise of the empty set does, and steps of it, whose columns are kept.
             nuisance = self._nuisance_blocks(candidates, self.regression.at(
                 self.blocks(candidates), start))
-        fit = self.regression.fit(self.blocks(candidates, nuisance), start)
+        exact = {component: {kind: block for kind, block in blocks.items() if kind != WAVES}
+                 for component, blocks in nuisance.items()}
+        fit = self.regression.fit(self.blocks(candidates, exact), start)
+        # The form of each effect is the catalogue's or off, by equal odds: the likelier one.
+        nuisance = {component: blocks if WAVES in blocks and self.regression.gain(
+            fit, blocks[WAVES]) > 0 else exact[component] for component, blocks in nuisance.items()}
+        if nuisance != exact:
+            fit = self.regression.fit(self.blocks(candidates, nuisance), start)
         fitted = self._set(candidates, fit, nuisance)
         possible = self.constraints.applied(self.regression, fit, fitted.blocks)
         if possible is None:

@@ -295,8 +295,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         delay, a shifted zero, gravity that turns. Sets of effects with and without it are then
         compared around models of their own.
     idealised : bool
-        False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
-        springs and cords are only nearly of the form that they have here.
+        False where the form is exact: inertia, gravity, geometry, a factor, a constant. Real
+        friction, springs and cords are only nearly of the form that they have here.
     shows_at_reversals : bool
         True where the effect shows most where friction turns over, so that friction which does so
         otherwise than modelled looks like it.

@@ -41,6 +41,7 @@ class EffortOffset(DriveEffect):
 
     name = 'effort_offset'
     may_be_measurement = True
+    idealised = False
     linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6, scale=0.5),)
 
     @classmethod
