@@ -4,10 +4,10 @@
 """Nuisance columns: the uncertainty of the form of an effect, in proportion to its force.
 
 Friction turns over at reversals in a width that nobody knows. Real effects depart from the
-catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Their force may also
-be off by waves over position and velocity. Each gives a column whose coefficient has unit prior.
-They are as the drive feels them: behind its sensor they would follow a delay that is none, and make
-good what it does to the forces.
+catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Friction may also be
+off by waves over position and velocity. Each gives a column whose coefficient has unit prior. They
+are as the drive feels them: behind its sensor they would follow a delay that is none, and make good
+what it does to the forces.
 """
 
 from __future__ import annotations
@@ -98,8 +98,8 @@ def deviation_rows(design: Design, term: Term, units: Array) -> Array:
 def form_rows(design: Design, term: Term, units: Array, share: float) -> Array:
     """Return a term's force times waves over position and velocity, (u, w, M) [N].
 
-    None for an effect whose form is exact, nor for one that is a wave itself: a wave times waves
-    is any force over position.
+    None for what is no friction: springs and counterbalances with waves over the position are any
+    force over it, and explained weights.
 
     Parameters
     ----------
@@ -111,8 +111,7 @@ def form_rows(design: Design, term: Term, units: Array, share: float) -> Array:
         All waves together over the force, both rms.
     """
     effect = term.effect
-    if term.drive is None or not (issubclass(effect, DriveEffect) and effect.idealised) or (
-            effect.is_wave or issubclass(effect, MeasurementEffect)):
+    if term.drive is None or not (effect.is_friction and issubclass(effect, DriveEffect)):
         return np.zeros((len(units), 0, len(design.residuals)))
     d = term.drive
 
