@@ -96,7 +96,7 @@ def deviation_rows(design: Design, term: Term, units: Array) -> Array:
 
 
 def form_rows(design: Design, term: Term, units: Array, share: float) -> Array:
-    """Return a term's force times waves over position and velocity, (u, w, M) [N].
+    """Return a friction's force times waves over position and velocity, (u, w, M) [N].
 
     None for what is no friction: springs and counterbalances with waves over the position are any
     force over it, and explained weights.

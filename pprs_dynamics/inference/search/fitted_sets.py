@@ -144,7 +144,7 @@ class FittedSets:
         exact = {component: {kind: block for kind, block in blocks.items() if kind != WAVES}
                  for component, blocks in nuisance.items()}
         fit = self.regression.fit(self.blocks(candidates, exact), start)
-        # The form of each effect is the catalogue's or off, by equal odds: the likelier one.
+        # The form of a friction is the catalogue's or off, by equal odds: the likelier one.
         nuisance = {component: blocks if WAVES in blocks and self.regression.gain(
             fit, blocks[WAVES]) > 0 else exact[component] for component, blocks in nuisance.items()}
         if nuisance != exact:
