@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
@@ -50,6 +52,9 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 MOST_STEPS = 6  # of relinearisation of one row
 MOST_SEARCHES = 5  # each around the best model of the one before: three are rare
 MOST_EXACT = 4  # rows of one search that get exact costs
+# Of cost above the best row, from which a row is left in the variants and on the drives that it
+# has: odds of exp(500) to 1 need no better bound.
+REMOTE = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +75,17 @@ class Row:
     linearisation: float | None = None
 
     @classmethod
-    def exact(cls, fits: FittedSets, fitted: CandidateSet) -> Row:
-        """Return a set around its own model, with the cost of exact forces."""
+    def exact(cls, fits: FittedSets, fitted: CandidateSet, best: float = np.inf) -> Row:
+        """Return a set around its own model, with the cost of exact forces.
+
+        Of a row that is not nearly as good as one of cost `best`, an upper bound of it.
+        """
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
                 around, moved = linearised(around, moved)
+                if moved.total > best + REMOTE:
+                    break
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
@@ -312,7 +322,7 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
 
 
 def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitted: CandidateSet,
-          ) -> dict[RowKey, Row]:
+          best: float = np.inf) -> dict[RowKey, Row]:
     """Return exact rows with that of a set; of the same names the cheapest one.
 
     And with those of the set with a form error, as which it costs no more. Where a set is
@@ -321,16 +331,17 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
     """
     found = dict(exact)
     if fitted.with_form is not None:
-        found = _with(found, first, fits, fitted.with_form)
+        found = _with(found, first, fits, fitted.with_form, best)
     of_row = fits if fitted.is_nonlinear else first
-    row = Row.exact(of_row, of_row.evaluate(fitted.candidates))
+    row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best)
     around, whole = row.fits, row.fitted
     parts = [other for other in around.sets if other.with_form is whole]
     for new in (row, *(Row(around, part, row.linearisation) for part in parts)):
         key = new.fitted.row_key
         found[key] = min(found.get(key, new), new, key=lambda row: row.cost)
     is_part = whole.barred and around.best.row_key < whole.row_key and around.best.candidates
-    return _with(found, first, around, replace(around.best, with_form=None)) if is_part else found
+    return _with(found, first, around, replace(around.best, with_form=None),
+                 best) if is_part else found
 
 
 def with_exact_best(table: ModelTable) -> ModelTable:
@@ -353,7 +364,8 @@ def with_exact_best(table: ModelTable) -> ModelTable:
                     and row.fitted.row_key not in table.exact), None)
         if row is None:
             break
-        table = replace(table, exact=_with(table.exact, table.first, row.fits, row.fitted))
+        table = replace(table, exact=_with(table.exact, table.first, row.fits, row.fitted,
+                                           best.cost))
     return table
 
 
