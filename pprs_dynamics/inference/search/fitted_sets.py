@@ -35,7 +35,9 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
-SHAPE_DIGITS = 4  # of a shape: at the optimum a cost changes by less than the least improvement
+# Of a shape's standard deviation, given the other shapes: to the next finer power of ten shapes are
+# rounded, by which a cost changes by less than the least improvement.
+SHAPE_ROUNDING = 0.5
 NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 ROUNDING = 1e-12  # of correlations
@@ -302,19 +304,25 @@ class FittedSets:
         fit = self.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
         if not moved and _gain(fit, list(blocks)) < LEAST_IMPROVEMENT:
             return None
+        index = fit.index_of(list(blocks))
+        known = dict(zip(index.tolist(), np.diag(np.linalg.inv(
+            fit.covariance[np.ix_(index, index)])) ** -0.5, strict=True)) if blocks else {}
         shapes: dict[Block, dict[str, float]] = {}
         for component, block in slopes.items():
             if block in shapes:
                 moved[component] = replace(component, shape=tuple(sorted(shapes[block].items())))
                 continue
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
-            for parameter, step in zip(effect.shape, fit.of(block), strict=True):
+            for at, parameter, step in zip(range(fit.places[block].start, fit.places[block].stop),
+                                           effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 bounded = parameter.of(units_of(self.design.given, component.drive).turns)
                 # Rounded, so that the same optimum is one set, from wherever it was reached.
-                shape[parameter.name] = float(
-                    f'{np.clip(value, bounded.lower, bounded.upper):.{SHAPE_DIGITS}g}')
+                decimals = -int(np.floor(np.log10(SHAPE_ROUNDING * parameter.spread(
+                    known[at], value))))
+                shape[parameter.name] = float(np.clip(
+                    round(value, decimals), bounded.lower, bounded.upper))
             shapes[block] = shape
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
