@@ -29,7 +29,9 @@ from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Fitted
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
 
-MOST_EFFECTS, MOST_UNKNOWN = 6, 4  # in a set: bounds of the effort
+# In a set: bounds of the effort. With four patterns, other effects stood for the same pattern on
+# the last two of six drives.
+MOST_EFFECTS, MOST_UNKNOWN = 6, 6
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED, FIRST_REFINED = 3, 6  # of the sets fitted in a round, and of those of one effect
