@@ -101,21 +101,25 @@ def test_a_gear_loses_no_less_where_the_motor_drives(tmp_path: Path) -> None:
     model, effect = real_arm(tmp_path), catalogue()['gear_efficiency']
     component = Component.of(effect, SWING, {}, ('driving', 'driven_back'))
     forces = model.drive_forces(MOVED)
-    fits = []
-    for losses in ((0.25, 0.1), (0.1, 0.25)):
+    load, fits = forces.mechanism.transmitted[:, SWING], []
+    for losses in ((0.25, 0.1), (0.1, 0.25), (0.5, -0.4)):
         effort = forces.total.copy()
-        effort[:, SWING] += gear(*losses)(forces.mechanism.transmitted[:, SWING])
+        effort[:, SWING] += gear(*losses)(load)
         effort += 0.05 * np.random.default_rng(0).normal(size=effort.shape)
         recording = Recording.from_arrays('run', MOVED.time, MOVED.position, None, effort,
                                           model.drives)
         sets = FittedSets(Design.of(model, [recording]), DECISIONS)
         fits.append(sets.evaluate((EffectCandidate.of([component]),)))
-    usual, impossible = fits
+    usual, impossible, pushing = fits
     np.testing.assert_allclose(usual.coefficients(component), [0.25, 0.1], atol=0.03)
     assert usual.terms.feasibility == 0
     driving, driven_back = impossible.coefficients(component)
     assert driving == pytest.approx(driven_back, rel=1e-6)
     assert impossible.terms.feasibility > DECISIONS.rival_margin
+    # Driven back, it may give back no more than the drive's own friction takes.
+    most = model.friction.dry(forces.mechanism.friction_load)[:, SWING].max()
+    assert pushing.coefficients(component)[1] == pytest.approx(
+        -most / np.abs(load[load * V < 0]).max(), rel=0.05)
     # What is the same both ways is friction by load, which is fitted in its place.
     assert impossible.form_of is not None
     assert [candidate.name for candidate in impossible.form_of] == ['load_friction']

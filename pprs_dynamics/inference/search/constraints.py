@@ -5,8 +5,8 @@
 
 - Each parameter is within the bounds of its effect.
 - No drive has less than no inertia, viscous, dry or load friction, the model's own included, in any
-  state: cold or warm, creeping or after a reversal. No gear loses less where its motor drives than
-  where the load does.
+  state: cold or warm, creeping, after a reversal or driven back. No gear loses less where its motor
+  drives than where the load does.
 - An added body is a body, and a link from which one is taken away remains one.
 
 Inequalities of the first two kinds are linear. Possible bodies form a convex set, which tangent
@@ -43,6 +43,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
@@ -84,6 +85,7 @@ IN_SOME_STATES: Mapping[tuple[str, str], tuple[str, str, float]] = {
     (FrictionDrift.name, 'force'): (DRY_FRICTION, 'force', 1.0),
     (FrictionDrift.name, 'worked'): (DRY_FRICTION, 'worked', 1.0),
     (FrictionDrift.name, 'thinned'): (VISCOUS_FRICTION, 'worked', 1.0),
+    (GearEfficiency.name, 'driven_back'): (DRY_FRICTION, 'driven_back', 1.0),
     (Hysteresis.name, 'force'): (DRY_FRICTION, 'force', -0.5),
     (Hysteresis.name, 'coefficient'): (LOAD_FRICTION, 'force', -0.5)}
 
