@@ -189,10 +189,15 @@ class Answer:
                 if prefix + key in given.values}
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
-        """Return estimates of an effect by sets that cost nearly as little, and what they cost."""
-        near = self.table.near(self.decisions.rival_margin)[:MOST_AVERAGED] if (
-            self.row is self.table.best) else []
-        return [(cost, estimate(self.table.last, fitted, same)) for cost, fitted in near
+        """Return estimates of an effect by sets that cost nearly as little, and what they cost.
+
+        Of a row that lacks refused effects, those of the best row: they may be there all the same.
+        """
+        table, best = self.table, self.table.best
+        near = [(table.last, cost, fitted) for cost, fitted in table.near(
+            self.decisions.rival_margin)[:MOST_AVERAGED]] if self.row is best else [
+                (best.fits, 0.0, best.fitted)]
+        return [(cost, estimate(fits, fitted, same)) for fits, cost, fitted in near
                 for same in fitted.effects
                 if same.effect is candidate.effect and same.course == candidate.course]
 
