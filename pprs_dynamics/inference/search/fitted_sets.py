@@ -35,8 +35,8 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
-# Of a shape's standard deviation, given the other shapes: to the next finer power of ten shapes are
-# rounded, by which a cost changes by less than the least improvement.
+# Shapes are rounded to a power of ten, of at most this share of their standard deviation given the
+# other shapes: a cost changes by less than the least improvement.
 SHAPE_ROUNDING = 0.5
 NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
@@ -251,9 +251,8 @@ class FittedSets:
         fit = self.free(fitted)  # constraints say nothing of the density at 0
         place = fit.places[block]
         # Moments of a body that a motion does not show are far less certain than its mass.
-        size = np.sqrt(np.diag(fit.covariance)[place])
+        size, alike = _correlation(fit.covariance[place, place])
         c = fit.coefficients[place] / size
-        alike = fit.covariance[place, place] / np.outer(size, size) + ROUNDING * np.eye(len(size))
         return float(c @ np.linalg.solve(alike, c) + np.linalg.slogdet(alike)[1]
                      + 2 * np.log(size).sum() + np.linalg.slogdet(block.precision)[1])
 
@@ -304,23 +303,22 @@ class FittedSets:
         fit = self.regression.at((*fitted.fit.blocks, *blocks), fitted.fit)
         if not moved and _gain(fit, list(blocks)) < LEAST_IMPROVEMENT:
             return None
-        index = fit.index_of(list(blocks))
-        known = dict(zip(index.tolist(), np.diag(np.linalg.inv(
-            fit.covariance[np.ix_(index, index)])) ** -0.5, strict=True)) if blocks else {}
+        index, known = fit.index_of(list(blocks)), np.zeros(len(fit.coefficients))
+        size, alike = _correlation(fit.covariance[np.ix_(index, index)])
+        known[index] = size * np.diag(np.linalg.inv(alike)) ** -0.5
         shapes: dict[Block, dict[str, float]] = {}
         for component, block in slopes.items():
             if block in shapes:
                 moved[component] = replace(component, shape=tuple(sorted(shapes[block].items())))
                 continue
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
-            for at, parameter, step in zip(range(fit.places[block].start, fit.places[block].stop),
-                                           effect.shape, fit.of(block), strict=True):
+            for parameter, step, std in zip(effect.shape, fit.of(block), known[fit.places[block]],
+                                            strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 bounded = parameter.of(units_of(self.design.given, component.drive).turns)
                 # Rounded, so that the same optimum is one set, from wherever it was reached.
-                decimals = -int(np.floor(np.log10(SHAPE_ROUNDING * parameter.spread(
-                    known[at], value))))
+                decimals = -int(np.floor(np.log10(SHAPE_ROUNDING * parameter.spread(std, value))))
                 shape[parameter.name] = float(np.clip(
                     round(value, decimals), bounded.lower, bounded.upper))
             shapes[block] = shape
@@ -399,6 +397,12 @@ def _gain(fit: JointFit, blocks: Sequence[Block]) -> float:
     places = fit.index_of(blocks)
     c = fit.coefficients[places]
     return float(c @ np.linalg.solve(fit.covariance[np.ix_(places, places)], c))
+
+
+def _correlation(covariance: Array) -> tuple[Array, Array]:
+    """Return standard deviations and correlations, invertible, of a covariance (k, k)."""
+    size = np.sqrt(np.diag(covariance))
+    return size, covariance / np.outer(size, size) + ROUNDING * np.eye(len(size))
 
 
 def _stepped(coefficients: Array) -> Array:

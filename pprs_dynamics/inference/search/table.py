@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-
-import numpy as np
+from math import inf
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.base_columns import CarriedOver
@@ -75,7 +74,7 @@ class Row:
     linearisation: float | None = None
 
     @classmethod
-    def exact(cls, fits: FittedSets, fitted: CandidateSet, best: float = np.inf) -> Row:
+    def exact(cls, fits: FittedSets, fitted: CandidateSet, best: float = inf) -> Row:
         """Return a set around its own model, with the cost of exact forces.
 
         Of a row that is not nearly as good as one of cost `best`, an upper bound of it.
@@ -322,12 +321,13 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
 
 
 def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitted: CandidateSet,
-          best: float = np.inf) -> dict[RowKey, Row]:
+          best: float = inf) -> dict[RowKey, Row]:
     """Return exact rows with that of a set; of the same names the cheapest one.
 
     And with those of the set with a form error, as which it costs no more. Where a set is
     inadmissible by its exact forces, also with that of its best part, from where that is in it: by
-    itself an effect takes the place of others, too, and may end far from there.
+    itself an effect takes the place of others, too, and may end far from there. `best` is as in
+    `Row.exact`.
     """
     found = dict(exact)
     if fitted.with_form is not None:
