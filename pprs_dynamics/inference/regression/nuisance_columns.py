@@ -51,10 +51,10 @@ def reversal_rows(design: Design, term: Term, units: Array) -> Array:
     units : (u, k) array
         Sets of coefficients by which its rows are multiplied.
     """
-    effect = term.effect
-    if term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect):
+    if (friction := _friction_of_drive(term)) is None:
         return np.zeros((len(units), 0, len(design.residuals)))
-    d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
+    effect, d = friction
+    width = design.model.reversal.widths(len(design.drives))[d]
     slowest = max(width, TURNS_OVER * design.covered[d].top_speed)
     widths = np.array([factor * (width if factor < 1 else slowest) for factor in DRIVE_WIDTHS])
 
@@ -110,16 +110,23 @@ def form_rows(design: Design, term: Term, units: Array, share: float) -> Array:
     share : float
         All waves together over the force, both rms.
     """
-    effect = term.effect
-    if term.drive is None or not (effect.is_friction and issubclass(effect, DriveEffect)):
+    if (friction := _friction_of_drive(term)) is None:
         return np.zeros((len(units), 0, len(design.residuals)))
-    d = term.drive
+    effect, d = friction
 
     def rows(recording: FullRate) -> list[Array]:
         force = share * units @ recording.columns(effect, d, term.shape)
         return [force * wave for wave in _form_waves(design, recording, d)]
 
     return _treated(design, len(units), rows)
+
+
+def _friction_of_drive(term: Term) -> tuple[type[DriveEffect], int] | None:
+    """Return a friction in a drive, and which drive; None for any other effect."""
+    if term.drive is None or not (
+            term.effect.is_friction and issubclass(term.effect, DriveEffect)):
+        return None
+    return term.effect, term.drive
 
 
 def _form_waves(design: Design, recording: FullRate, d: int) -> list[Array]:
