@@ -157,12 +157,13 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
     return root_mean_square(linear_residual(fits, fitted))
 
 
-def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
+def linearised(fits: FittedSets, fitted: CandidateSet, most: float = np.inf,
+               ) -> tuple[FittedSets, CandidateSet]:
     """Return a set around its own fitted model, and the fitted sets that it is one of.
 
     Gauss-Newton steps with the effects of the set, each halved until the exact misfit falls, until
-    the cost stands still: around a delay the columns of all other effects are late, too. The
-    arguments are returned where nothing changes.
+    the cost stands still, or is above `most` after one: around a delay the columns of all other
+    effects are late, too. The arguments are returned where nothing changes.
 
     Raises
     ------
@@ -178,6 +179,8 @@ def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, Cand
         before, fits = fitted.total, fits.around(point, alone=True)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
         change = abs(fitted.total - before)
+        if fitted.total > most:
+            break
     return fits, fitted
 
 
@@ -222,9 +225,9 @@ def is_shown(fits: FittedSets, fitted: CandidateSet) -> bool:
 
     They may differ by less than the margin of rivals.
     """
-    if not fitted.is_nonlinear:
+    if not fitted.effects:
         return True
-    if not has_nonlinear(fits, fitted):
+    if fitted.is_nonlinear and not has_nonlinear(fits, fitted):
         return False
     try:
         exact = fits.design.exact_forces(fitted_model(fits, fitted))

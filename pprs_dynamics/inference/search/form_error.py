@@ -13,8 +13,6 @@ input model's friction counts with `Decisions.own_form_share`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -26,11 +24,8 @@ from pprs_dynamics.inference.search.candidates import (
     Candidates,
     CandidateSet,
     EffectCandidate,
-    joined,
 )
-from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
-from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
@@ -87,9 +82,6 @@ class FormErrors:
         forces, least = self.forces(fitted), 1.0
         found: tuple[str, Candidates | None] = '', None
         for candidate in fitted.candidates:
-            if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
-                return (f'{candidate.name} may be the form error of friction that is the same in '
-                        'both directions'), self._symmetric(fitted, candidate)
             drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
             allowed, names = self.beside(fitted, candidate, drives, len(fitted.candidates) > 1,
                                          forces)
@@ -101,19 +93,6 @@ class FormErrors:
                 found = (f'{_in_words(candidate.name)} may be the form error of '
                          f'{" and ".join(map(_in_words, names))}',
                          fitted.without(candidate))
-        return found
-
-    def _symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> Candidates:
-        """Return a set with friction that is the same in both directions for one that is not."""
-        found = fitted.without(candidate)
-        for component in candidate.components:
-            known = {(part.effect.name, part.drive) for c in found for part in c.components}
-            for name in dict.fromkeys(map(candidate.effect.symmetric.__getitem__, component.names)):
-                if (name, component.drive) not in known:
-                    effect = catalogue()[name]
-                    found = joined(found, [replace(placed(
-                        self.design, effect, component.drive, {},
-                        tuple(c.name for c in effect.coefficients)), course=component.course)])
         return found
 
     def forces(self, fitted: CandidateSet) -> Forces:
@@ -172,22 +151,6 @@ class FormErrors:
                 square += own
                 names |= {name: None} if own > 0 else {}
         return square, tuple(names)
-
-    def _is_symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> bool:
-        """Return whether friction that differs by direction does so by less than its form error."""
-        effect_of, half, whole = candidate.effect.symmetric, 0.0, 0.0
-        for component in candidate.components:
-            block, known = fitted.blocks[component], list(component.names)
-            others = [next((other for other in known if other != name and name in effect_of
-                            and effect_of.get(other) == effect_of[name]), '') for name in known]
-            if not known or '' in others:
-                return False
-            c = fitted.fit.of(block)
-            mirrored = c.copy()
-            mirrored[:len(known)] = c[[known.index(other) for other in others]]
-            half += sum(self._of_block(fitted, block, (c - mirrored) / 2).values())
-            whole += sum(self._of_block(fitted, block, (c + mirrored) / 2).values())
-        return half < self.decisions.form_share ** 2 * whole
 
     def _beyond_others(self, fitted: CandidateSet, candidate: Candidate, covariance: Array,
                        ) -> float:

@@ -22,12 +22,14 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
     UnknownCandidate,
+    joined,
 )
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_model import is_shown
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, best_patterns
+from pprs_dynamics.physics.effects.catalogue import catalogue
 
 # In a set: bounds of the effort. With four patterns, other effects stood for the same pattern on
 # the last two of six drives.
@@ -246,9 +248,12 @@ def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidate
 
 
 def simplified(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
-    """Return a set without candidates and drives, and in variants, as long as that costs less."""
+    """Return a set with less, and in variants, as long as that costs less.
+
+    Without candidates and drives, or with friction that is the same in both directions.
+    """
     return _descended(fits, fitted,
-                      lambda fitted: [*_with_fewer(fitted), *_otherwise(fits, fitted)])
+                      lambda fitted: [*_with_fewer(fits, fitted), *_otherwise(fits, fitted)])
 
 
 def of_same_names(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
@@ -282,6 +287,21 @@ def _may_share(fits: FittedSets, candidate: EffectCandidate) -> bool:
                 and len({fits.design.given.units[d].turns for d in candidate.drives or ()}) == 1)
 
 
+def _same_both_ways(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
+                    ) -> Candidates:
+    """Return a set with friction that is the same in both directions for one that is not."""
+    found = fitted.without(candidate)
+    for component in candidate.components:
+        known = {(part.effect.name, part.drive) for c in found for part in c.components}
+        for name in dict.fromkeys(map(candidate.effect.symmetric.__getitem__, component.names)):
+            if (name, component.drive) not in known:
+                effect = catalogue()[name]
+                found = joined(found, [replace(placed(
+                    fits.design, effect, component.drive, {},
+                    tuple(c.name for c in effect.coefficients)), course=component.course)])
+    return found
+
+
 def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidates]:
     """Yield a set with an effect on one drive more, in the shape of its strongest drive."""
     for candidate in fitted.effects:
@@ -297,9 +317,12 @@ def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidat
                         is_shared=strongest.is_shared)]))
 
 
-def _with_fewer(best: CandidateSet) -> Iterator[Candidates]:
+def _with_fewer(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
     for candidate in best.candidates if len(best.candidates) > 1 else ():
         yield best.without(candidate)
+    for effect in best.effects:
+        if effect.effect.symmetric:
+            yield _same_both_ways(fits, best, effect)
 
 
 def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:

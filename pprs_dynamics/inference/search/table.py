@@ -82,7 +82,7 @@ class Row:
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved)
+                around, moved = linearised(around, moved, best + REMOTE)
                 if moved.total > best + REMOTE:
                     break
                 before, moved = moved, of_same_names(around, moved)
@@ -221,14 +221,20 @@ class ModelTable:
                        and fitted.cost < self.reported.cost + margin), key=lambda pair: pair[0])
 
     def rivals(self, margin: float) -> list[Rival]:
-        """Return the rows within a margin of the least that claim other effects."""
+        """Return the rows within a margin of the least that claim other effects.
+
+        Friction that differs by direction claims no other than the same both ways, but more of it.
+        """
         mine = {candidate.placed_name: candidate.name for candidate in self.best.effects}
         rivals = []
         for row in self.rows[1:]:
             if row.cost > self.best.cost + margin:
                 break
             theirs = {candidate.placed_name: candidate.name for candidate in row.effects}
-            missing = sorted(name for place, name in mine.items() if place not in theirs)
+            more = {name for candidate in row.effects
+                    for name in candidate.effect.symmetric.values()}
+            missing = sorted(name for place, name in mine.items()
+                             if place not in theirs and name not in more)
             instead = sorted(place if name in mine.values() else name
                              for place, name in theirs.items() if place not in mine)
             if missing and instead:
@@ -316,7 +322,8 @@ def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row
     for fitted in _shortlist(fits):
         row = exact.get(fitted.row_key)
         if row is None or fitted.cost < row.cost - LEAST_CHANGE:
-            exact = _with(exact, first, fits, fitted)
+            best = min((known.cost for known in exact.values()), default=inf)
+            exact = _with(exact, first, fits, fitted, best)
     return exact
 
 
