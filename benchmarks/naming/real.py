@@ -137,7 +137,9 @@ def _base(part: Part, data: Path, folder: Path) -> Path:
     base, full = folder / f'{model.stem}_base.yaml', folder / f'{model.stem}_full.yaml'
     with contextlib.chdir(folder):
         if not base.exists():
-            pprs(['fit', *part.fitted, '--model', model.name, '--output', base.name])
+            # The pendulum's torque looks like no measurement, which ends a fit.
+            pprs(['fit', *part.fitted, '--model', model.name, '--output', base.name,
+                  '--as-it-is'])
         if part.adopted and not full.exists():
             pprs(['diagnose', *part.fitted, '--model', base.name, '--adopt-all', '--output',
                   full.name])
