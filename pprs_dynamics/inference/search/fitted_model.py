@@ -221,9 +221,9 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet, change: float =
 
 
 def is_shown(fits: FittedSets, fitted: CandidateSet) -> bool:
-    """Return whether a set has no nonlinear effect, or its exact forces are those of the columns.
+    """Return whether the exact forces of a set are those of the columns, within the rival margin.
 
-    They may differ by less than the margin of rivals.
+    Effects that are linear by themselves change loads, which friction follows.
     """
     if not fitted.effects:
         return True
