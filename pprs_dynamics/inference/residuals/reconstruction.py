@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 4_000  # samples at a time; a million at once would take gigabytes
+MOST_KEPT = 2 ** 27  # bytes of a recording's kinematics, which many models share
 MOTION = ('position', 'velocity', 'acceleration')
 
 
@@ -149,11 +152,21 @@ class Reconstruction(DriveMotion):
                 stop = int(starts[last]) if last < len(starts) else len(self)
                 rows = slice(int(starts[first]), stop)
                 measured = {name: values[rows] for name, values in self.channels.items()}
-                yield Chunk(self.motion[rows].with_time(self.time[rows]).with_channels(measured),
-                            rows,
+                motion = self.motion[rows].with_time(self.time[rows]).with_channels(measured)
+                yield Chunk(replace(motion, kept=self._kept_of(rows.start)), rows,
                             slice(first, last), rows.start == segment.start,
                             self.treat.blocks(first, last))
                 first = last
+
+    @cached_property
+    def _kept(self) -> dict[int, dict[Any, LinkMotion]]:
+        """Kinematics that are kept, by first sample of a chunk and by structure."""
+        return {}
+
+    def _kept_of(self, first: int) -> dict[Any, LinkMotion] | None:
+        """Return where the kinematics of a chunk are kept; None where there is no room."""
+        size = sum(links.rows.nbytes for kept in self._kept.values() for links in kept.values())
+        return self._kept.setdefault(first, {}) if size < MOST_KEPT else self._kept.get(first)
 
 
 def reconstruct(model: DriveModel, recording: Recording) -> Reconstruction:

@@ -155,6 +155,8 @@ class JointMotion:
         [s]
     channels : mapping of str to (N, D) array
         Further measurements of the drives, such as `temperature` [degC].
+    kept : dict of Structure to LinkMotion, optional
+        Where the kinematics of this motion are kept for another evaluation of it.
     """
 
     position: Array
@@ -162,6 +164,7 @@ class JointMotion:
     acceleration: Array
     time: Array | None = None
     channels: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
+    kept: dict[Any, Any] | None = field(default=None, kw_only=True, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.position)
@@ -170,7 +173,7 @@ class JointMotion:
         """Return the samples that a slice, a mask or indices select."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples],
                        acceleration=self.acceleration[samples],
-                       time=None if self.time is None else self.time[samples],
+                       time=None if self.time is None else self.time[samples], kept=None,
                        channels={name: values[samples] for name, values in self.channels.items()})
 
     def with_time(self, time: ArrayLike) -> Self:
@@ -209,4 +212,4 @@ class JointMotion:
         """Return the last position, at rest, at time 0."""
         rest = np.zeros_like(self.position[-1:])
         return replace(self, position=self.position[-1:], velocity=rest, acceleration=rest,
-                       time=np.zeros(1), channels={})
+                       time=np.zeros(1), channels={}, kept=None)

@@ -294,6 +294,7 @@ class Mechanism:
             nearby, (motion, start) = None, self.drive_motion(motion, closed)
         state = MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
                                channels=motion.channels, robot=self, reversal=reversal,
+                               known=(motion.kept or {}).get(self.structure), kept=motion.kept,
                                start=start, nearby=nearby, friction=friction)
         if found is not None:
             found = found if found.q is not None else found._replace(q=start)

@@ -170,7 +170,7 @@ class MechanismState(JointMotion):
     @cached_property
     def inverse_dynamics(self) -> tree.InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
-        if self.known is not None or self.load is not None:
+        if self.known is not None or self.load is not None or self.kept is not None:
             return None
         found: tree.InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
         return found
@@ -178,7 +178,10 @@ class MechanismState(JointMotion):
     @cached_property
     def links(self) -> Any:
         """The kinematics, a `LinkMotion`."""
-        return self.robot.kinematics(self) if self.known is None else self.known
+        found = self.robot.kinematics(self) if self.known is None else self.known
+        if self.kept is not None:
+            self.kept[self.robot.structure] = found
+        return found
 
     @property
     def closed(self) -> Array:
@@ -235,7 +238,8 @@ class MechanismState(JointMotion):
         """Return the state with a drive at other positions; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
-        return replace(self, position=position, known=None, start=self.closed, nearby=None)
+        return replace(self, position=position, known=None, kept=None, start=self.closed,
+                       nearby=None)
 
     def friction_efforts(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
