@@ -13,7 +13,7 @@ coefficients, priors and costs always mean the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -175,18 +175,19 @@ class Design:
             self.residuals = replace(self.residuals, measured=np.concatenate(
                 [found.treat(found.effort) for found in self.reconstructions]))
 
-    def around(self, point: OperatingPoint, alone: bool = False) -> Design:
+    def around(self, point: OperatingPoint,
+               effects: Collection[type[CatalogueEffect]] | None = None) -> Design:
         """Return the design of the same recordings around another operating point.
 
         Parameters
         ----------
         point : OperatingPoint
-        alone : bool
-            Nothing is to be added to its effects: others outside the drives get no columns.
+        effects : collection of type of CatalogueEffect, optional
+            The only ones outside the drives that get columns; by default all.
         """
         design = self._evaluated(
             point.model, self.given, self.reconstructed(point.model),
-            effects={effect.effect for effect in point.effects} if alone else None,
+            effects=effects,
             reversals={(column.drive, column.number) for column in self.base
                        if isinstance(column, ReversalShape)},
             known=self._unmoved(point)).beside(self.carried)

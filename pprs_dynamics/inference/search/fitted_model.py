@@ -22,7 +22,13 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.search.candidates import REVERSAL, SINCE, CandidateSet
+from pprs_dynamics.inference.search.candidates import (
+    REVERSAL,
+    SINCE,
+    Candidates,
+    CandidateSet,
+    EffectCandidate,
+)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -158,12 +164,13 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
 
 
 def linearised(fits: FittedSets, fitted: CandidateSet, most: float = np.inf,
-               ) -> tuple[FittedSets, CandidateSet]:
+               beside: Candidates = ()) -> tuple[FittedSets, CandidateSet]:
     """Return a set around its own fitted model, and the fitted sets that it is one of.
 
     Gauss-Newton steps with the effects of the set, each halved until the exact misfit falls, until
     the cost stands still, or is above `most` after one: around a delay the columns of all other
-    effects are late, too. The arguments are returned where nothing changes.
+    effects are late, too. Outside the drives only these effects and those of candidates `beside`
+    them get columns. The arguments are returned where nothing changes.
 
     Raises
     ------
@@ -171,12 +178,13 @@ def linearised(fits: FittedSets, fitted: CandidateSet, most: float = np.inf,
         For values that no model may have.
     """
     fitted = fits.refined(fitted)
+    effects = {c.effect for c in (*fitted.candidates, *beside) if isinstance(c, EffectCandidate)}
     change = np.inf
     for _ in range(MOST_STEPS):
         point = next_operating_point(fits, fitted, change)
         if point is None:
             break
-        before, fits = fitted.total, fits.around(point, alone=True)
+        before, fits = fitted.total, fits.around(point, effects)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
         change = abs(fitted.total - before)
         if fitted.total > most:

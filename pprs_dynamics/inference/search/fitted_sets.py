@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -33,6 +33,7 @@ from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 # Shapes are rounded to a power of ten, of at most this share of their standard deviation given the
@@ -78,12 +79,13 @@ class FittedSets:
         self._best: CandidateSet | None = None
         self._nuisance: dict[Hashable, Mapping[str, Block]] = {}
 
-    def around(self, point: OperatingPoint, alone: bool = False) -> FittedSets:
+    def around(self, point: OperatingPoint,
+               effects: Collection[type[CatalogueEffect]] | None = None) -> FittedSets:
         """Return sets of the same recordings around another operating point, none fitted yet.
 
         See `Design.around`.
         """
-        return FittedSets(self.design.around(point, alone), self.decisions,
+        return FittedSets(self.design.around(point, effects), self.decisions,
                           self.regression.error_scale)
 
     @property
@@ -150,7 +152,7 @@ class FittedSets:
         nuisance = {component: blocks if WAVES in blocks and self.regression.gain(
             fit, blocks[WAVES]) > 0 else exact[component] for component, blocks in nuisance.items()}
         if nuisance != exact:
-            fit = self.regression.fit(self.blocks(candidates, nuisance), start)
+            fit = self.regression.fit(self.blocks(candidates, nuisance), fit)
         fitted = self._set(candidates, fit, nuisance)
         possible = self.constraints.applied(self.regression, fit, fitted.blocks)
         if possible is None:

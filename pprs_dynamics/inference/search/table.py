@@ -20,6 +20,7 @@ from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
+    Candidates,
     CandidateSet,
     CostTerms,
     EffectCandidate,
@@ -74,15 +75,17 @@ class Row:
     linearisation: float | None = None
 
     @classmethod
-    def exact(cls, fits: FittedSets, fitted: CandidateSet, best: float = inf) -> Row:
+    def exact(cls, fits: FittedSets, fitted: CandidateSet, best: float = inf,
+              form: Candidates = ()) -> Row:
         """Return a set around its own model, with the cost of exact forces.
 
-        Of a row that is not nearly as good as one of cost `best`, an upper bound of it.
+        Of a row that is not nearly as good as one of cost `best`, an upper bound of it. It costs no
+        more than with `form`, where that is its form error.
         """
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved, best + REMOTE)
+                around, moved = linearised(around, moved, best + REMOTE, form)
                 if moved.total > best + REMOTE:
                     break
                 before, moved = moved, of_same_names(around, moved)
@@ -91,6 +94,9 @@ class Row:
             exact = around.design.exact_forces(fitted_model(around, moved))
         except PprsError:
             return cls(fits, replace(fitted, barred='no model can have its values'), 0.0)
+        if form:
+            around.evaluate((*moved.candidates, *form))
+            moved = around.evaluate(moved.candidates)
         return cls(around, moved, squared(around, moved, exact - linear_prediction(around, moved)))
 
     @property
@@ -331,16 +337,15 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
           best: float = inf) -> dict[RowKey, Row]:
     """Return exact rows with that of a set; of the same names the cheapest one.
 
-    And with those of the set with a form error, as which it costs no more. Where a set is
-    inadmissible by its exact forces, also with that of its best part, from where that is in it: by
-    itself an effect takes the place of others, too, and may end far from there. `best` is as in
-    `Row.exact`.
+    Where a set is inadmissible by its exact forces, also with that of its best part, from where
+    that is in it: by itself an effect takes the place of others, too, and may end far from there.
+    `best` is as in `Row.exact`.
     """
     found = dict(exact)
-    if fitted.with_form is not None:
-        found = _with(found, first, fits, fitted.with_form, best)
     of_row = fits if fitted.is_nonlinear else first
-    row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best)
+    form = () if fitted.with_form is None else tuple(
+        c for c in fitted.with_form.candidates if c not in fitted.candidates)
+    row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best, form)
     around, whole = row.fits, row.fitted
     parts = [other for other in around.sets if other.with_form is whole]
     for new in (row, *(Row(around, part, row.linearisation) for part in parts)):
