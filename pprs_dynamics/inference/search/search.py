@@ -102,9 +102,13 @@ class Search:
                         if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
                 for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
                     simplified(self.fits, fitted)
-            for fitted in self._inadmissible():
-                self._fit(self._with_others(fitted))
-                self._fit(reduced(fitted, component) for component in fitted.blocks)
+            # A part of an inadmissible set that would be the best may be the best, or what it
+            # stood for may, which is in the best set's form error.
+            barred = min((fitted for fitted in self.fits.sets if fitted.barred),
+                         key=lambda fitted: fitted.total, default=self.best)
+            if barred.total < self.best.cost + LEAST_IMPROVEMENT:
+                self._fit(self._with_others(barred))
+                self._fit(reduced(barred, component) for component in barred.blocks)
             simplified(self.fits, self.best)
             self._fit(self._with_same_form())
             if not self.best.cost < before - LEAST_IMPROVEMENT:
@@ -128,12 +132,6 @@ class Search:
             if fitted.is_admissible and fitted.plain < most and names.isdisjoint(
                     c.name for c in fitted.candidates):
                 yield (*fitted.candidates, *form)
-
-    def _inadmissible(self) -> list[CandidateSet]:
-        """Return inadmissible sets that would be the best: a part of one may be the best."""
-        found = [fitted for fitted in self.fits.sets
-                 if fitted.barred and fitted.total < self.best.cost + LEAST_IMPROVEMENT]
-        return sorted(found, key=lambda fitted: fitted.total)[:REPLACEMENTS]
 
     # Moves
 

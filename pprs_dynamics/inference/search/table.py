@@ -346,14 +346,10 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
     form = () if fitted.with_form is None else tuple(
         c for c in fitted.with_form.candidates if c not in fitted.candidates)
     row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best, form)
-    around, whole = row.fits, row.fitted
-    parts = [other for other in around.sets if other.with_form is whole]
-    for new in (row, *(Row(around, part, row.linearisation) for part in parts)):
-        key = new.fitted.row_key
-        found[key] = min(found.get(key, new), new, key=lambda row: row.cost)
-    is_part = whole.barred and around.best.row_key < whole.row_key and around.best.candidates
-    return _with(found, first, around, replace(around.best, with_form=None),
-                 best) if is_part else found
+    key, part = row.fitted.row_key, row.fits.best
+    found[key] = min(found.get(key, row), row, key=lambda row: row.cost)
+    is_part = row.fitted.barred and part.row_key < key and part.candidates
+    return _with(found, first, row.fits, part, best) if is_part else found
 
 
 def with_exact_best(table: ModelTable) -> ModelTable:
