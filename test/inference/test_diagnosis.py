@@ -244,4 +244,4 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     (value,), stds = {delay.value for delay in delays.values()}, [
         delay.std for delay in delays.values()]
     assert value == pytest.approx(0.008, abs=3 * stds[0])
-    assert stds == pytest.approx([stds[0]] * 5, rel=0.01)
+    assert stds == pytest.approx([stds[0]] * 5)

@@ -146,7 +146,7 @@ class Answer:
         """Return an effect of the row with its values and errors."""
         fits, fitted, force = self.fits, self.fitted, self.force(candidate)
         estimates = averaged(estimate(fits, fitted, candidate, fitted.is_dated),
-                             self._nearly(candidate))
+                             self._nearly(candidate), candidate.shared)
         parameters = estimates.parameters
         without = self.table.without(candidate)
         with_force, less = self.over_noise(self.remaining), self.over_noise(self.remaining + force)

@@ -244,6 +244,12 @@ class EffectCandidate:
         return self
 
     @property
+    def shared(self) -> frozenset[str]:
+        """Names of parameters that all its drives have in common."""
+        return frozenset(parameter.name for parameter in self.effect.shape if all(
+            component.is_shared for component in self.components))
+
+    @property
     def hypotheses(self) -> frozenset[Hashable]:
         """Hypotheses that it contains, each with the prior odds of a name.
 

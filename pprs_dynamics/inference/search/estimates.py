@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -174,7 +174,8 @@ def _beside_centre(component: Component, c: Array, fit: JointFit, index: Sequenc
     return {' '.join(['mass', *terms]): combination} if terms else {}, float(variance)
 
 
-def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
+def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]],
+             shared: Collection[str] = ()) -> Estimates:
     """Return estimates whose uncertainty has what other sets say differently.
 
     Parameters
@@ -183,12 +184,18 @@ def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> 
         Their values stay.
     others : sequence of (float, Estimates)
         Each with what its set costs more, which weighs it by exp(-cost / 2).
+    shared : collection of str
+        Parameters that all drives share: another set may have them on fewer drives.
     """
     weights = np.array([1.0, *(np.exp(-0.5 * max(more, 0.0)) for more, _ in others)])
     share = weights / weights.sum()
     parameters = {}
     for key, estimate in reported.parameters.items():
-        there = [estimate, *(estimates.parameters.get(key, estimate) for _, estimates in others)]
+        name = key.rpartition('.')[2]
+        there = [estimate, *(next((
+            other for at, other in estimates.parameters.items()
+            if at == key or (name in shared and at.endswith(f'.{name}'))), estimate)
+            for _, estimates in others)]
         squares = [other.std ** 2 + (other.value - estimate.value) ** 2 for other in there]
         parameters[key] = replace(estimate, std=float(np.sqrt(share @ squares)))
     return replace(reported, parameters=parameters)

@@ -280,8 +280,7 @@ def _descended(fits: FittedSets, fitted: CandidateSet,
 def _may_share(fits: FittedSets, candidate: EffectCandidate) -> bool:
     """Return whether shapes of an effect on several drives may be one: what they measure is."""
     parts = candidate.components
-    return bool(candidate.effect.shape and len(parts) > 1
-                and not all(component.is_shared for component in parts)
+    return bool(candidate.effect.shape and len(parts) > 1 and not candidate.shared
                 and len({fits.design.given.units[d].turns for d in candidate.drives or ()}) == 1)
 
 
