@@ -27,7 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
     RowKey,
 )
 from pprs_dynamics.inference.search.courses import fit_courses, fit_curves
-from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.fitted_model import (
     LEAST_CHANGE,
     fitted_model,
@@ -226,6 +226,7 @@ class ModelTable:
                        if fitted is not self.reported
                        and fitted.cost < self.reported.cost + margin), key=lambda pair: pair[0])
 
+    @outside_cost('friction that differs by direction is no rival of friction that does not')
     def rivals(self, margin: float) -> list[Rival]:
         """Return the rows within a margin of the least that claim other effects.
 
