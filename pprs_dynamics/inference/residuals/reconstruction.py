@@ -164,7 +164,12 @@ class Reconstruction(DriveMotion):
         return {}
 
     def _kept_of(self, first: int) -> dict[Any, LinkMotion] | None:
-        """Return where the kinematics of a chunk are kept; None where there is no room."""
+        """Return where the kinematics of a chunk are kept.
+
+        None where there is no room, or where the motion is that of one model's encoders alone.
+        """
+        if self.position is not self.read.position:
+            return None
         size = sum(links.rows.nbytes for kept in self._kept.values() for links in kept.values())
         return self._kept.setdefault(first, {}) if size < MOST_KEPT else self._kept.get(first)
 
