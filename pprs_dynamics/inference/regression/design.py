@@ -158,7 +158,7 @@ class Design:
         """
         report = progress or (lambda share: None)
         design = cls._evaluated(model, model, tuple(
-            reconstruct(model, recording) for recording in recordings), report)
+            replace(reconstruct(model, recording), keeps=True) for recording in recordings), report)
         design._drop_unknown_past()
         return design
 

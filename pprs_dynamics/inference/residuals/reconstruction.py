@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 4_000  # samples at a time; a million at once would take gigabytes
-MOST_KEPT = 2 ** 27  # bytes of a recording's kinematics, which many models share
+MOST_KEPT = 2 ** 27  # bytes of kinematics, of a recording on which many models are evaluated
 MOTION = ('position', 'velocity', 'acceleration')
 
 
@@ -95,6 +95,8 @@ class Reconstruction(DriveMotion):
     windup : (3, N, D) array or None
         By how much these lead the links, as second encoders say, with its rates; 0 in drives
         without one, None where no drive has one.
+    keeps : bool
+        Whether it keeps kinematics, `MOST_KEPT` of them, because many models are evaluated on it.
     """
 
     time: Array
@@ -106,6 +108,7 @@ class Reconstruction(DriveMotion):
     recorded: Recording
     read: DriveMotion
     windup: Array | None
+    keeps: bool = False
 
     def __len__(self) -> int:
         return len(self.time)
@@ -164,11 +167,8 @@ class Reconstruction(DriveMotion):
         return {}
 
     def _kept_of(self, first: int) -> dict[Any, LinkMotion] | None:
-        """Return where the kinematics of a chunk are kept.
-
-        None where there is no room, or where the motion is that of one model's encoders alone.
-        """
-        if self.position is not self.read.position:
+        """Return where the kinematics of a chunk are kept; None where they are not."""
+        if not self.keeps:
             return None
         size = sum(links.rows.nbytes for kept in self._kept.values() for links in kept.values())
         return self._kept.setdefault(first, {}) if size < MOST_KEPT else self._kept.get(first)
@@ -231,7 +231,7 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
     drives = _followed_rightly(model, reconstruction.recorded, reconstruction.read,
                                reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
-                   acceleration=drives.acceleration, smoothing=drives.smoothing)
+                   acceleration=drives.acceleration, smoothing=drives.smoothing, keeps=False)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,

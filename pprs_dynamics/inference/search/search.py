@@ -102,8 +102,8 @@ class Search:
                         if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
                 for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
                     simplified(self.fits, fitted)
-            # A part of an inadmissible set that would be the best may be the best, or what it
-            # stood for may, which is in the best set's form error.
+            # A part of an inadmissible set that would cost least may cost least. The best set with
+            # its form error is such a set.
             barred = min((fitted for fitted in self.fits.sets if fitted.barred),
                          key=lambda fitted: fitted.total, default=self.best)
             if barred.total < self.best.cost + LEAST_IMPROVEMENT:
