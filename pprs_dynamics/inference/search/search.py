@@ -36,6 +36,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 MOST_EFFECTS, MOST_UNKNOWN = 6, 6
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
+INADMISSIBLE = 2  # sets of which parts are tried: often they differ by little
 REFINED, FIRST_REFINED = 3, 6  # of the sets fitted in a round, and of those of one effect
 USUAL_STEPS = 50  # sets fitted and drives scanned, after which a bar stands at half
 # How much worse than the best a replacement may look at the best one's noise (its own noise may
@@ -102,13 +103,9 @@ class Search:
                         if fitted.cost < self.best.cost + self.fits.decisions.rival_margin]
                 for fitted in sorted(near, key=lambda fitted: fitted.cost)[:REFINED]:
                     simplified(self.fits, fitted)
-            # A part of an inadmissible set that would cost least may cost least. The best set with
-            # its form error is such a set.
-            barred = min((fitted for fitted in self.fits.sets if fitted.barred),
-                         key=lambda fitted: fitted.total, default=self.best)
-            if barred.total < self.best.cost + LEAST_IMPROVEMENT:
-                self._fit(self._with_others(barred))
-                self._fit(reduced(barred, component) for component in barred.blocks)
+            for fitted in self._inadmissible():
+                self._fit(self._with_others(fitted))
+                self._fit(reduced(fitted, component) for component in fitted.blocks)
             simplified(self.fits, self.best)
             self._fit(self._with_same_form())
             if not self.best.cost < before - LEAST_IMPROVEMENT:
@@ -132,6 +129,12 @@ class Search:
             if fitted.is_admissible and fitted.plain < most and names.isdisjoint(
                     c.name for c in fitted.candidates):
                 yield (*fitted.candidates, *form)
+
+    def _inadmissible(self) -> list[CandidateSet]:
+        """Return inadmissible sets that would be the best: a part of one may be the best."""
+        found = [fitted for fitted in self.fits.sets
+                 if fitted.barred and fitted.total < self.best.cost + LEAST_IMPROVEMENT]
+        return sorted(found, key=lambda fitted: fitted.total)[:INADMISSIBLE]
 
     # Moves
 
