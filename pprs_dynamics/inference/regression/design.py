@@ -13,7 +13,7 @@ coefficients, priors and costs always mean the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -176,13 +176,13 @@ class Design:
                 [found.treat(found.effort) for found in self.reconstructions]))
 
     def around(self, point: OperatingPoint,
-               effects: Collection[type[CatalogueEffect]] | None = None) -> Design:
+               effects: Container[type[CatalogueEffect]] | None = None) -> Design:
         """Return the design of the same recordings around another operating point.
 
         Parameters
         ----------
         point : OperatingPoint
-        effects : collection of type of CatalogueEffect, optional
+        effects : container of type of CatalogueEffect, optional
             The only ones outside the drives that get columns; by default all.
         """
         design = self._evaluated(

@@ -353,6 +353,12 @@ class CandidateSet:
         return self.terms.total
 
     @property
+    def form(self) -> Candidates:
+        """Candidates that are a form error of the set; none where it has none."""
+        return () if self.with_form is None else tuple(
+            c for c in self.with_form.candidates if c not in self.candidates)
+
+    @property
     def plain(self) -> float:
         """Sum of all terms but form errors."""
         return self.total - self.terms.forms

@@ -175,7 +175,7 @@ def _beside_centre(component: Component, c: Array, fit: JointFit, index: Sequenc
 
 
 def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]],
-             shared: Collection[str] = ()) -> Estimates:
+             shared: Collection[str]) -> Estimates:
     """Return estimates whose uncertainty has what other sets say differently.
 
     Parameters

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Container, Hashable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -80,7 +80,7 @@ class FittedSets:
         self._nuisance: dict[Hashable, Mapping[str, Block]] = {}
 
     def around(self, point: OperatingPoint,
-               effects: Collection[type[CatalogueEffect]] | None = None) -> FittedSets:
+               effects: Container[type[CatalogueEffect]] | None = None) -> FittedSets:
         """Return sets of the same recordings around another operating point, none fitted yet.
 
         See `Design.around`.

@@ -118,11 +118,10 @@ class Search:
 
         What it is made of without one of its effects, and others that cost as little without it.
         """
-        best, known = self.best, self.best.with_form
+        best, known, form = self.best, self.best.with_form, self.best.form
         if known is None:
             return
         yield from map(known.without, known.candidates)
-        form = [c for c in known.candidates if c not in best.candidates]
         names = {c.name for c in form}
         most = best.plain + self.fits.decisions.rival_margin
         for fitted in self.fits.sets:

@@ -344,9 +344,7 @@ def _with(exact: Mapping[RowKey, Row], first: FittedSets, fits: FittedSets, fitt
     """
     found = dict(exact)
     of_row = fits if fitted.is_nonlinear else first
-    form = () if fitted.with_form is None else tuple(
-        c for c in fitted.with_form.candidates if c not in fitted.candidates)
-    row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best, form)
+    row = Row.exact(of_row, of_row.evaluate(fitted.candidates), best, fitted.form)
     key, part = row.fitted.row_key, row.fits.best
     found[key] = min(found.get(key, row), row, key=lambda row: row.cost)
     is_part = row.fitted.barred and part.row_key < key and part.candidates

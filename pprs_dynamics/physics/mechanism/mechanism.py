@@ -386,7 +386,8 @@ class Mechanism:
                  start: Array | None = None) -> tree.InverseDynamicsResult | None:
         """Return the efforts for a motion of the drives, friction included.
 
-        None for a motion of the tool, and where a sample is out of reach or singular.
+        None for a motion of the tool, for one whose kinematics are kept, which one pass does not,
+        and where a sample is out of reach or singular.
 
         Parameters
         ----------
@@ -398,7 +399,7 @@ class Mechanism:
         start : (N, C) array, optional
             See `Evaluation.forward_kinematics`.
         """
-        if not isinstance(motion, JointMotion):
+        if not isinstance(motion, JointMotion) or motion.kept is not None:
             return None
         structure, moved = self.structure, (motion.position, motion.velocity, motion.acceleration)
         given = np.array(moved)

@@ -170,7 +170,7 @@ class MechanismState(JointMotion):
     @cached_property
     def inverse_dynamics(self) -> tree.InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
-        if self.known is not None or self.load is not None or self.kept is not None:
+        if self.known is not None or self.load is not None:
             return None
         found: tree.InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
         return found
@@ -178,7 +178,9 @@ class MechanismState(JointMotion):
     @cached_property
     def links(self) -> Any:
         """The kinematics, a `LinkMotion`."""
-        found = self.robot.kinematics(self) if self.known is None else self.known
+        if self.known is not None:
+            return self.known
+        found = self.robot.kinematics(self)
         if self.kept is not None:
             self.kept[self.robot.structure] = found
         return found

@@ -324,10 +324,7 @@ class DriveModel:
         """
         self._require_motion(motion)
         parameters, closed = self._own_parameters, None if state is None else state.closed
-        # One pass keeps no kinematics.
-        is_kept = isinstance(motion, JointMotion) and motion.kept is not None
-        found = None if parameters is None or is_kept else self.robot.one_pass(
-            motion, parameters, closed)
+        found = None if parameters is None else self.robot.one_pass(motion, parameters, closed)
         if found is None:
             # No pass, or a sample out of reach or near a singularity: every sample is checked.
             # Very large numbers overflow; users of the result check that it is finite.
