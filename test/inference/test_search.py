@@ -56,12 +56,15 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
-def test_two_effects_on_two_drives_are_not_one_flexible_effect_on_both() -> None:
-    recording = recording_of({'coulomb_friction': {'slide_1.force': 0.6},
-                              'quadratic_friction': {'slide_2.coefficient': 20.0}})
-    found = tabulate(MODEL, [recording], DECISIONS).best.effects
-    assert {effect.name: effect.drives for effect in found} == {
-        'coulomb_friction': (0,), 'quadratic_friction': (1,)}
+@pytest.mark.parametrize(('noise', 'effects'), [
+    (0.08, {'coulomb_friction': {'slide_1.force': 0.6},
+            'quadratic_friction': {'slide_2.coefficient': 20.0}}),
+    (0.3, {'coulomb_friction': {f'{drive}.force': 0.8 for drive in DRIVES},
+           'effort_offset': {f'{drive}.force': 0.7 for drive in DRIVES}})])
+def test_two_effects_are_not_one_flexible_effect(noise: float, effects: Effects) -> None:
+    found = tabulate(MODEL, [recording_of(effects, noise)], DECISIONS).best.effects
+    assert {effect.name: [DRIVES[d] for d in effect.drives or ()] for effect in found} == {
+        name: [key.split('.')[0] for key in values] for name, values in effects.items()}
 
 
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])

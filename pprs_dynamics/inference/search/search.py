@@ -197,7 +197,11 @@ class Search:
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             yield from self._instead(best, best.without(candidate), None)
         for candidate in best.effects:
-            # Friction that differs by direction contains other effects, another on each drive.
+            # Friction that differs by direction contains other effects, another on each drive: an
+            # offset beside friction that is the same both ways.
+            if candidate.effect.symmetric:
+                yield from self._instead(
+                    best, _same_both_ways(self.fits, best, candidate), REPLACEMENTS)
             for component in candidate.components if candidate.effect.symmetric and len(
                     candidate.components) > 1 else ():
                 yield from self._instead(best, reduced(best, component), REPLACEMENTS)
