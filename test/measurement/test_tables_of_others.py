@@ -61,7 +61,8 @@ ALL = {'time': 1, **numbered('position', 'effort')}
 NAMED = {'time': 't', **{f'{joint}.{quantity}': f'{short}{k}' for k, joint in enumerate(JOINTS)
                          for quantity, short in (('position', 'q'), ('effort', 'tau'))}}
 HEADER = 't,' + ','.join(f'q{k}' for k in range(3)) + ',' + ','.join(f'tau{k}' for k in range(3))
-DATES = ['T'.join(datetime.fromtimestamp(EPOCH + t, UTC).isoformat().split('T')) for t in TIME]
+DATES, LATE = ([datetime.fromtimestamp(start + t, UTC).isoformat() for t in TIME]
+               for start in (EPOCH, 86400 - STEP))
 TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
     'no header': (text(WHOLE), ALL),
     'blanks between': (text(WHOLE, '   '), ALL),
@@ -70,12 +71,11 @@ TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
     'numbers with a header': (text(WHOLE, header='some,words,that,no,one,can,spell\n'), ALL),
     'header of numpy': ('# ' + text(WHOLE, header=HEADER + '\n'), NAMED),
     'sep of a spreadsheet': ('sep=;\n' + text(WHOLE, ';', HEADER.replace(',', ';') + '\n'), NAMED),
-    'no time': (text(WHOLE[:, 1:]), {'rate': 1 / STEP, **numbered(
-        'position', 'effort', first=1)}),
-    'milliseconds': (text(np.column_stack([1e3 * TIME, WHOLE[:, 1:]])),
-                     {**ALL, 'time_scale': 1e-3}),
-    'ISO 8601': ('\n'.join([HEADER, *(','.join([date, *map(repr, row)]) for date, row in zip(
-        DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
+    'no time': (text(WHOLE[:, 1:]), {'rate': 1 / STEP, **numbered('position', 'effort', first=1)}),
+    'milliseconds': (text(WHOLE * ([1e3] + 6 * [1])), {**ALL, 'time_scale': 1e-3}),
+    **{kind: ('\n'.join([HEADER, *(','.join([date, *map(repr, row)]) for date, row in zip(
+        dates, WHOLE[:, 1:].tolist(), strict=True))]), NAMED) for kind, dates in (
+            ('ISO 8601', DATES), ('over midnight', [clock[11:] for clock in LATE]))},
     'time alone is called otherwise': (text(WHOLE, header='stamp,' + ','.join(
         f'{joint}/{quantity}' for quantity in ('position', 'effort') for joint in JOINTS) + '\n'),
         {'time': 'stamp'}),

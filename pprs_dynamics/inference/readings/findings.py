@@ -89,7 +89,7 @@ class OtherReading(Mistake):
 def columns_line(scales: Iterable[Scale], has_columns: bool = False) -> str:
     """Return the line of a model file with which a recording is read as it looks; '' for none.
 
-    Where the file has `columns` already, what is to be added to the columns of each drive.
+    Where the file has `columns` already, what is to be added or changed there.
     """
     blocks: dict[str, dict[str, None]] = {}
     for drive, key, value in scales:
@@ -98,7 +98,7 @@ def columns_line(scales: Iterable[Scale], has_columns: bool = False) -> str:
     entries = [entry if not drive else f'{as_yaml(drive)}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
     if has_columns and entries:
-        return f'under columns, in addition to its content: {", ".join(entries)}'
+        return f'under columns, add or change only these keys: {", ".join(entries)}'
     return f'columns: {{{", ".join(entries)}}}' if entries else ''
 
 

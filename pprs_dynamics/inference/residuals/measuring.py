@@ -110,6 +110,8 @@ def join_tables(model: DriveModel, tables: list[dict[Any, Array]]) -> Residuals:
     start, segments = 0.0, 0.0
     for number, table in enumerate(tables):
         table['record'] = np.full(len(table['time']), float(number))
+        steps = np.diff(table['time'], prepend=table['time'][0])  # back where a clock was set back
+        table['time'] = table['time'] + np.cumsum(np.where(steps < 0, PAUSE - steps, 0.0))
         table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
         table['segment'] = table['segment'] + segments
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1

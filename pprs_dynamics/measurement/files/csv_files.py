@@ -47,6 +47,7 @@ NO_NUMBERS = ['', 'nan', 'NaN', 'NAN', 'N/A', 'NA', 'null', 'NULL', 'None']
 PREAMBLE = 20  # lines that may stand above a table
 NO_TEXT = ('not a recording, must be a bag (rosbag2, .mcap, .db3, ROS 1) or a table (.csv, '
            '.parquet, .mat, .npz, .json)')
+DAY = 86400.0  # [s]
 CLOCK = re.compile(r'\d(:\d\d|T\d{4})')  # in every time of day
 CONTROLS = re.compile(rb'[\x00-\x08\x0e-\x1f]')  # in no text
 BEGINNING = 1 << 16  # bytes by which the encoding is recognised
@@ -177,7 +178,9 @@ class CsvTable:
                     progress(min(raw.tell(), size), size)
         if not sum(map(len, blocks)):
             raise UnreadableFileError(self.path, 'no samples below the header')
-        return list(np.concatenate(blocks).T)
+        columns = list(np.concatenate(blocks).T)
+        return [_past_midnight(values) if k in dates else values
+                for k, values in zip(used, columns, strict=True)]
 
     def series(self, most: int) -> Iterator[Series]:
         """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
@@ -302,6 +305,14 @@ def _seconds_of(date: str) -> float:
         except ArithmeticError:  # of digits without end
             raise ValueError(date) from None
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def _past_midnight(times: Array) -> Array:
+    """Return dates, (N,) [s], where those that are times of day go on rising after midnight."""
+    known = np.isfinite(times)
+    if not np.any(times[known] >= DAY):
+        times[known] += DAY * np.cumsum(np.diff(times[known], prepend=0.0) < -DAY / 2)
+    return times
 
 
 @contextmanager

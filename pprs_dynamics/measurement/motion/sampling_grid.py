@@ -75,10 +75,10 @@ class SamplingGrid:
 
 
 def _spline(x: Array, values: Array, at: Array) -> Array:
-    """Return values (n, D) at places x (n,) between these, by a cubic spline."""
+    """Return values (n, D) at places x (n,) between these, by a spline: cubic from four values."""
     from scipy.interpolate import make_interp_spline
 
-    found: Array = make_interp_spline(x, values, k=3)(at)
+    found: Array = make_interp_spline(x, values, k=min(3, len(x) - 1))(at)
     return found
 
 
