@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -524,19 +525,30 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
 
 
 def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
-    """Return names of files with * for what they have in common: the name of the recording."""
-    parts = {kind: re.split('([^A-Za-z0-9])', file.name.partition('.')[0])
-             for kind, file in files.items()}
-    shared = next((at for at in (-1, 0) if len({part[at] for part in parts.values()}) == 1), None)
+    """Return names of files with * for what they have in common: the name of the recording.
+
+    It ends the names, or begins them where it has digits there alone, or they end in nothing alike.
+    """
+    stems = {kind: file.name.partition('.')[0] for kind, file in files.items()}
+    parts = [re.findall('[A-Za-z]+|[0-9]+|.', stem) for stem in stems.values()]
+    start, end = _common(parts), _common([part[::-1] for part in parts])[::-1]
+    begins = bool(start) and (not end or (_has_digits(start) and not _has_digits(end)))
+    size = len(''.join(start).rstrip('_- ') if begins else ''.join(end).lstrip('_- '))
     found = {}
-    for kind, part in parts.items():
-        ending = files[kind].name.removeprefix(''.join(part))
-        if shared is None:
-            part.append('*')
-        else:
-            part[shared] = '*'
-        found[kind] = ''.join(part) + ending
+    for kind, stem in stems.items():
+        named = f'*{stem[size:]}' if begins else f'{stem[:len(stem) - size]}*'
+        found[kind] = named + files[kind].name.removeprefix(stem)
     return found
+
+
+def _common(parts: Sequence[Sequence[str]]) -> list[str]:
+    """Return what all begin with."""
+    return [alike[0] for alike in takewhile(lambda alike: len(set(alike)) == 1,
+                                            zip(*parts, strict=False))]
+
+
+def _has_digits(parts: Iterable[str]) -> bool:
+    return any(part.isdigit() for part in parts)
 
 
 # -------------------------------------------------------------------------------------- text
