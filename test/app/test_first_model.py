@@ -243,11 +243,12 @@ def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(tmp_path: P
     (tmp_path / 'x.urdf').write_text(f'<robot name="x">{text}</robot>')
     for name, values in (('position', Q), ('effort', TAU)):
         named = {f'- arm_{k + 1}_joint_{name}': values[:, k] for k in (2, 0, 1)}
-        pd.DataFrame({'t': TIME, **named}).to_csv(tmp_path / f'{name}.csv', index=False)
-    first = first_model(tmp_path / 'x.urdf', [tmp_path / 'position.csv', tmp_path / 'effort.csv'],
-                        tmp_path / 'robot.yaml')
+        for run in ('run_1', 'run_2'):
+            pd.DataFrame({'t': TIME, **named}).to_csv(tmp_path / f'{run}_{name}.csv', index=False)
+    first = first_model(tmp_path / 'x.urdf', sorted(tmp_path.glob('run_1*')), tmp_path / 'r.yaml')
     assert first.model.drives == joints[1:]
-    assert_read(read_recording(first.recordings[0], first.model.recorded), velocity=False)
+    # The second run in the folder is read, too.
+    assert_read(read_recording(tmp_path / 'run_2_effort.csv', first.model.recorded), velocity=False)
 
 
 def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path: Path) -> None:
