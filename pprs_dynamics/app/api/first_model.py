@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -532,7 +532,8 @@ def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
     stems = {kind: file.name.partition('.')[0] for kind, file in files.items()}
     parts = [re.findall('[A-Za-z]+|[0-9]+|.', stem) for stem in stems.values()]
     start, end = _common(parts), _common([part[::-1] for part in parts])[::-1]
-    begins = bool(start) and (not end or (_has_digits(start) and not _has_digits(end)))
+    numbered = [any(map(str.isdigit, part)) for part in (start, end)]
+    begins = bool(start) and (not end or numbered == [True, False])
     size = len(''.join(start).rstrip('_- ') if begins else ''.join(end).lstrip('_- '))
     found = {}
     for kind, stem in stems.items():
@@ -545,10 +546,6 @@ def _common(parts: Sequence[Sequence[str]]) -> list[str]:
     """Return what all begin with."""
     return [alike[0] for alike in takewhile(lambda alike: len(set(alike)) == 1,
                                             zip(*parts, strict=False))]
-
-
-def _has_digits(parts: Iterable[str]) -> bool:
-    return any(part.isdigit() for part in parts)
 
 
 # -------------------------------------------------------------------------------------- text

@@ -107,20 +107,20 @@ def treated_table(
 
 def join_tables(model: DriveModel, tables: list[dict[Any, Array]]) -> Residuals:
     """Return the residuals of a model on recordings one after the other, from their tables."""
-    start, segments = 0.0, 0.0
+    segments = 0.0
     for number, table in enumerate(tables):
         table['record'] = np.full(len(table['time']), float(number))
-        steps = np.diff(table['time'], prepend=table['time'][0])  # back where a clock was set back
-        table['time'] = table['time'] + np.cumsum(np.where(steps < 0, PAUSE - steps, 0.0))
-        table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
         table['segment'] = table['segment'] + segments
-        start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
+        segments = table['segment'][-1] + 1
     joined = (tables[0] if len(tables) == 1 else
               {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
     names = [*MOTION, *(key.name for key in joined if isinstance(key, Variable))]
     variables = {name: joined.pop(Variable(name)) for name in dict.fromkeys(names)}
     time = joined.pop('time')
     segment, record = (joined.pop(name).astype(int) for name in ('segment', 'record'))
+    steps = np.diff(time, prepend=time[0])
+    is_break = (steps < 0) | (np.diff(record, prepend=record[0]) > 0)  # or a clock was set back
+    time = time + np.cumsum(np.where(is_break, PAUSE - steps, 0.0))
     measured, total = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]  # none between poses that are held
     return Residuals(model.drives, time, segment, measured, total, joined, variables,

@@ -202,9 +202,8 @@ class Search:
             if candidate.effect.symmetric:
                 yield from self._instead(
                     best, _same_both_ways(self.fits, best, candidate), REPLACEMENTS)
-            for component in candidate.components if candidate.effect.symmetric and len(
-                    candidate.components) > 1 else ():
-                yield from self._instead(best, reduced(best, component), REPLACEMENTS)
+                for component in candidate.components if len(candidate.components) > 1 else ():
+                    yield from self._instead(best, reduced(best, component), REPLACEMENTS)
         for pair in combinations(best.candidates, 2):
             if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
