@@ -8,6 +8,7 @@ Motion and efforts come from equations of their own, not from the package.
 
 from __future__ import annotations
 
+import re
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -202,6 +203,14 @@ def test_velocities_have_a_unit_of_their_own_or_contradict_the_times(
     assert bool(said) or first.columns['elbow']['velocity_scale'] == pytest.approx(1 / speed, 1e-3)
 
 
+def test_efforts_without_a_name_are_what_the_model_explains(tmp_path: Path) -> None:
+    time, q, v, effort = run_of_arm()
+    other = 30 + np.cumsum(np.random.default_rng(1).normal(0, 1e-3, q.shape), axis=0)
+    found = read_table(tmp_path, 'T,th1,th2,x1,x2,w1,w2,M1,M2', time, q, other, v, effort)
+    np.testing.assert_allclose(found.effort, effort, atol=1e-6)
+    assert not asked_about(tmp_path, 't,q1,q2,x1,x2', time, q, other).has_efforts
+
+
 @pytest.mark.parametrize('head', ['q1,q2,dq1,dq2,tau1,tau2', ''])
 def test_velocities_in_another_unit_than_positions_show_no_rate(head: str, tmp_path: Path) -> None:
     _, q, v, effort = run_of_arm()
@@ -254,6 +263,27 @@ def test_angles_that_begin_again_each_turn_run_on(unit: float, lowest: float, he
     np.testing.assert_allclose(found.effort, effort, atol=1e-6)
 
 
+@pytest.mark.parametrize('unit', [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize('head', ['t,q1,q2', 't,q1,q2,i1,i2', 't,q1,q2,dq1,dq2'])
+def test_stamps_since_boot_are_in_the_unit_that_makes_a_motion(head: str, unit: float,
+                                                               tmp_path: Path) -> None:
+    time, q, v, effort = run_of_arm()
+    more = [values for name, values in (('i1', effort), ('dq', v)) if name in head]
+    first = asked_about(tmp_path, head, np.round((417.3 + time) / unit), q, *more)
+    assert first.columns['time_scale'] == unit
+
+
+@pytest.mark.parametrize('head', ['t,qa1,qa2,qb1,qb2,tau1,tau2', 't,x1,x2,y1,y2,tau1,tau2',
+                                  't,q1,q2,q1,q2,tau1,tau2'])
+def test_a_position_that_follows_the_one_by_name_is_a_question(head: str, tmp_path: Path) -> None:
+    time, q, _, effort = run_of_arm()
+    late, names = np.vstack([q[:1]] * 6 + [q[:-6]]), head.split(',')
+    lines = asked_about(tmp_path, head, time, q, late, effort).questions
+    assert [re.findall(r'position: (\w+)', line) for line in lines] == [
+        names[3:5] if names[1] != names[3] else ['4', '5'],
+        names[1:3] if names[1] != names[3] else ['2', '3']]
+
+
 @pytest.mark.parametrize('head', ['sec,nanosec', 'field.header.stamp.secs,field.header.stamp.nsecs',
                                   'tv_sec,tv_usec', ''])
 def test_seconds_and_their_fractions_may_be_columns_each(head: str, tmp_path: Path) -> None:
@@ -301,13 +331,14 @@ def test_one_effort_of_two_joints_is_a_question(head: str, columns: str, tmp_pat
     *(('', np.pi / 180, unit) for unit in ((0.6, 0.3), (2.5, 0.9), (0.6, 0.6))),
     # 6.88 A per N m are nearly what turns in place of radians do to the efforts.
     ('', 2 * np.pi, (6.88, 6.88)), ('t,q1,q2,tau1,tau2', 2 * np.pi, (9.0, 9.0)),
-    ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.3)), ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.6))])
+    *((f't,q1,q2,{effort}1,{effort}2', 1.0, (0.6, 0.3)) for effort in ('tau', 'i', 'out')),
+    ('t,q1,q2,tau1,tau2', 1.0, (0.6, 0.6))])
 def test_amperes_and_shares_of_an_unknown_effort_are_a_question(
     head: str, angle: float, unit: tuple[float, float], tmp_path: Path,
 ) -> None:
     time, q, _, effort = run_of_arm()
     first = asked_about(tmp_path, head, time, q / angle, effort / unit)
-    assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain'))
+    assert any(word in ''.join(first.questions) for word in ('effort_scale', 'gain: [0.6, 0.3]'))
     # Of an unknown force no unit of positions follows.
     assert not set('%_') & {*head} or 'position_scale' not in ''.join(first.questions)
 

@@ -218,6 +218,14 @@ def test_degrees_from_another_zero_are_beyond_the_limits(tmp_path: Path) -> None
         r'-?90 degrees \(\w+\)', found)}
 
 
+@pytest.mark.parametrize('zeros', [(1, 2), (1, -1), (-1, 2)])
+def test_two_zeros_that_are_off_are_found_together(zeros: tuple[int, int], arm: DriveModel) -> None:
+    time, q, _, effort = run(6)
+    found = told(arm, time, q - np.pi / 2 * np.array(zeros), effort)
+    assert [int(angle) for angle in re.findall(r'(-?\d+) degrees \(', found)] == [
+        90 * zero for zero in zeros]
+
+
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
     time, q, v, effort = run()
     (tmp_path / 'arm.urdf').write_text(ARM)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from pprs_dynamics.inference.readings.evidence import (
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
     OtherReading,
+    find_amperes,
     find_motion,
     find_no_measurements,
     find_other_velocities,
@@ -41,7 +43,7 @@ from pprs_dynamics.inference.readings.findings import (
 from pprs_dynamics.inference.readings.links import velocity_links
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
-from pprs_dynamics.measurement.files.defects import SLOW_STEP
+from pprs_dynamics.measurement.files.defects import OTHER_UNIT_STEP, SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
@@ -128,8 +130,15 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
             kind, model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in said) or PLAIN for said in by_reading),
             ' or '.join(line for said in by_reading for line in lines_of(said, has_columns))))
-    mistakes += find_shares(model)
+    shares = tuple(find_shares(model))
+    mistakes += shares
     evidence = search.evidence(search.rows[0])
+    if not (search.has_gain or shares):
+        factors = search.effort_factors((likely or [Fit(search.rows[0])])[0].reading)
+        # Without weight the inertia may be a guess: only a first model is asked about.
+        if is_first or (evidence is not None and evidence.has_weight and np.any(
+                np.abs(np.log(np.abs(factors))) > np.log(table.OTHER_UNIT))):
+            mistakes.append(find_amperes(model, factors))
     if mistakes or evidence is None:
         return tuple(mistakes)
     return tuple(find_no_measurements(model, recording, evidence))
@@ -162,8 +171,11 @@ class Search:
                  rate: float | None = None) -> None:
         self.model = model
         # Gaps are other ones in milliseconds.
-        self._excerpts = {1.0: excerpt, **{unit: other for unit in _time_units(recording) if (
-            other := excerpt_of(recording, table.STRETCHES, unit)) is not None}}
+        self._step = _step(recording)
+        self._excerpts = {1.0: excerpt, **{
+            unit: other for unit in table.TIMES if self._step > SLOW_STEP
+            and table.SHORTEST <= self._step * unit <= SLOW_STEP
+            and (other := excerpt_of(recording, table.STRETCHES, unit)) is not None}}
         columns = model.recorded.columns
         self.rate = columns.rate if rate is None and columns is not None else rate
         # Recorded velocities over the derivatives of positions, each with its relative doubt.
@@ -186,7 +198,8 @@ class Search:
         self.cost_of_constants = table.COST['drive_constant'] - table.UNCHECKED * is_first
         self.is_first = is_first
         self.same_masses = np.log(table.OTHER_UNIT if self.is_first else table.SAME_MASSES)
-        self.has_gain = knows_forces(model)  # without it masses and units are no evidence
+        # Without a gain masses and units are no evidence.
+        self.has_gain = knows_forces(model, recording)
         self.masses = table.MASSES if self.has_gain else np.inf
         self.start, self.explains = Fit(self.rows[0]), False
         self.fits: list[Fit] = []
@@ -245,7 +258,7 @@ class Search:
                           for fit in self.fits_of(row.after(first))]
         self.start = start = self._top()
         # Without masses a gravity of any size may explain positions in another unit.
-        explains = not start.reading.kinds - {'rate'} and np.all(
+        explains = not start.reading.kinds - {'rate'} and not self._slow(start.reading) and np.all(
             start.reading.effort_scale == 1) and self.has_gain and (
                 max(start.priors) < table.PLAUSIBLE)
         if explains and max(start.residuals) < table.CLOSE_FIT:
@@ -255,16 +268,20 @@ class Search:
         self.explains = bool(explains and max(start.residuals) < table.EXPLAINED)
         tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST} - (
             set() if self.has_gain else {'mounting', *table.LACKING})
+        # An arm that stands upright at the zeros of one file lies at those of another: of the two
+        # joints that differ each explains little alone.
+        pairs = [replace(second.after(first.after(self.rows[0])),
+                         drives=first.drives + second.drives)
+                 for first, second in combinations(self._zeros(), 2)
+                 if first.drives != second.drives]
         seed = None
         while self._top() is not seed:
             seed = self._top()
             mountings = mountings_in(self.model, self.excerpt(seed.reading), seed.reading)
             self._extend(seed, (*self.rows[1:], *mountings, *self._rates(seed.reading)), tried)
-            # Of two zeros that are off, one alone may explain little.
-            zeros = [fit for fit in self.fits if fit.reading.kinds == {'position_offset'}]
-            if seed is start and zeros:
-                self._extend(max(zeros, key=lambda fit: fit.score), self.rows[1:],
-                             tried & {'position_offset'})
+            if not any(max(fit.residuals) < table.EXPLAINED for fit in self.fits if np.all(
+                    fit.reading.effort_scale == 1)):
+                self._extend(seed, pairs, tried)
         return self._top()
 
     def _extend(self, seed: Fit, rows: Sequence[Reading], tried: Collection[str]) -> None:
@@ -336,7 +353,7 @@ class Search:
         if {'drive_order', *table.LACKING} & {row.kind, *before.kinds}:
             return not before.kinds
         return all(row.kind != part.kind or (row.kind == 'position_offset' and not (
-            {*row.drives} & {*part.drives})) for part in before.parts)
+            {*row.drives} & {*part.drives}) and len(row.drives) == 1) for part in before.parts)
 
     def _after(self, row: Reading, before: Reading) -> list[Reading]:
         """Return the possible readings that add a row to another one.
@@ -344,9 +361,14 @@ class Search:
         In another unit the zeros of positions may be off as well.
         """
         reading = row.after(before)
-        zeros = [zero.after(reading) for zero in self.rows if zero.kind == 'position_offset'] if (
-            row.kind == 'position_unit' and not self._possible(reading)) else []
+        is_of_all = len(row.drives) == sum(units.turns for units in self.model.units)
+        zeros = [zero.after(reading) for zero in self._zeros()] if row.kind == 'position_unit' and (
+            not (self.fits_of(reading) if is_of_all else self._possible(reading))) else []
         return [found for found in (reading, *zeros) if self._possible(found)]
+
+    def _zeros(self) -> list[Reading]:
+        """Return the rows in which the zero of one drive is off."""
+        return [row for row in self.rows if row.kind == 'position_offset']
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
         # Symmetric robots fit nearly as well in another order of their drives.
@@ -398,7 +420,8 @@ class Search:
         excerpt = self.excerpt(reading)
         if reading.kinds and not self._possible(reading):
             return []
-        cost = reading.cost + self._outside(reading) + self._against_velocities(reading)
+        cost = (reading.cost + self._outside(reading) + self._against_velocities(reading)
+                + self._slow(reading))
         if not np.isfinite(excerpt.effort).any():
             return [Fit(reading, -cost, (table.GOOD_FIT,))]
         evidence = self.evidence(reading)
@@ -436,6 +459,12 @@ class Search:
             fits = [fit for fit in fits if np.mean(fit.priors) <= table.PLAUSIBLE]
         return fits
 
+    def effort_factors(self, reading: Reading) -> Array:
+        """Return the factors of inertia and gravity in efforts, (D,); NaN where none is certain."""
+        evidence, columns = self.evidence(reading), reading.efforts.tolist()
+        return np.array([np.nan if evidence is None else evidence.factor(d, column)
+                         for d, column in enumerate(columns)])
+
     def _effort_rows(self, reading: Reading, evidence: Evidence, measured: Sequence[int],
                      negated: Array) -> Iterator[tuple[Array, float]]:
         """Yield scales of efforts, (D,), and their prior cost.
@@ -452,7 +481,7 @@ class Search:
         kinds = [negated[[*family]] for family in table.families(self.model.drives)]
         yield negated, _cost(negated[measured]) if np.ptp(negated[measured]) == 0 else sum(
             _cost(kind[:1] if np.ptp(kind) == 0 else kind) for kind in kinds)
-        factors = np.array([evidence.factor(d, e) for d, e in enumerate(reading.efforts.tolist())])
+        factors = self.effort_factors(reading)
         known = [d for d in measured if np.isfinite(factors[d])]
         drives, recorded = np.arange(len(factors)), evidence.total[
             np.arange(len(factors)), reading.efforts] > 0
@@ -472,8 +501,12 @@ class Search:
         is_other = not reading.load and np.any(others) if self.is_first else (
             np.all(others) and len(known) >= min(2, len(factors)))
         if is_other and not any(off[unit] < table.OFF_IN_UNIT[unit][0] for unit in off):
-            # Drives that show no factor of their own are recorded like the others.
-            yield (np.where(np.isin(drives, known), factors, np.median(factors[known])),
+            # Others bear a weight that hardly changes, or are recorded like these.
+            of_means = np.array([evidence.factor_of_means(d, column)
+                                 for d, column in enumerate(reading.efforts.tolist())])
+            is_weight = (np.sign(of_means) == signs[0]) & (not reading.kinds)
+            yield (np.where(np.isin(drives, known), factors, np.where(
+                is_weight, of_means, np.median(factors[known]))),
                    _cost(signs[:1]) + (table.COST[table.POSITION_ERROR] if np.all(
                        sizes < table.LARGEST_COMPLIANCE) else self.cost_of_constants))
 
@@ -520,6 +553,11 @@ class Search:
         return tiny + (table.FAR_OUTSIDE if most > table.FAR
                        else table.OUTSIDE if most > table.BEYOND else 0.0)
 
+    def _slow(self, reading: Reading) -> float:
+        """Return the cost of steps that cannot follow a robot, where another unit has others."""
+        return table.SLOW * (len(self._excerpts) > 1 and (
+            self._step * reading.time_unit >= OTHER_UNIT_STEP))
+
     def _against_velocities(self, reading: Reading) -> float:
         """Return the cost of times and positions that no unit of the recorded velocities suits."""
         # Velocities are in the unit of the positions, or in one of their own.
@@ -536,10 +574,8 @@ def _cost(scales: Sequence[float] | Array) -> float:
                      + table.COST['effort_unit'] * (abs(scale) != 1) for scale in scales))
 
 
-def _time_units(recording: Recording) -> list[float]:
-    """Return units of time in which the steps would be those of a robot's recording [s]."""
-    steps = np.concatenate([np.diff(recording.time[part]) for part in recording.segments]
-                           or [np.zeros(0)])
-    step = float(np.median(steps)) if len(steps) else 0.0
-    return [unit for unit in table.TIMES
-            if step > SLOW_STEP and table.SHORTEST <= step * unit <= SLOW_STEP]
+def _step(recording: Recording) -> float:
+    """Return the median step of time between samples of a motion [s]; 0 of poses that are held."""
+    steps = [np.diff(recording.time[part]) for part in recording.segments
+             if part.stop - part.start > 1 and not recording.are_poses]
+    return float(np.median(np.concatenate(steps))) if steps else 0.0

@@ -147,10 +147,17 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     if quantity and not titled:
         columns = {(joint, quantity): item.column
                    for joint, item in zip(joints, left, strict=False)}
-    elif model is not None and main not in {kind for _, kind in columns}:
-        by_numbers = True
-        columns = _by_numbers(left, joints, time, rate, stamp, notes, model)
+    elif model is not None and not ({kind for _, kind in columns} >= {main}
+                                    and {EFFORT, CURRENT} & {kind for _, kind in columns}):
+        by_numbers = not columns
+        columns = _by_numbers(left, joints, time, rate, stamp, notes, model, columns)
     found = {joint: by_column[column] for (joint, kind), column in columns.items() if kind == main}
+    later = {} if quantity or by_numbers else _measured_by_numbers(found, left, columns)
+    if later:
+        raise AmbiguousColumns(
+            [{**stamp, **columns, **later}, {**stamp, **columns}],
+            f'{" and ".join(map(str, later.values()))} may be measured, of which '
+            f'{" and ".join(str(columns[key]) for key in later)} are the command')
     if found and not quantity and not {EFFORT, CURRENT} & {kind for _, kind in columns}:
         efforts = [item.column for item in left if item.column not in columns.values() and (
             may_be(item.title, EFFORT) if by_numbers else EFFORT in kinds_of(words_of(item.title)))]
@@ -212,6 +219,28 @@ def _rate_of(columns: Columns, series: Mapping[Column, Series], time: Array | No
     notes.append(f'rate {rate:g} Hz: the velocities are the derivatives of the positions at '
                  'this rate')
     return rate
+
+
+def _measured_by_numbers(found: Mapping[str, Series], series: Sequence[Series],
+                         columns: Columns) -> Columns:
+    """Return columns without a clear name that follow all positions found by name, or have noise.
+
+    Parameters
+    ----------
+    found : mapping of str to Series
+        Positions by joint.
+    series : sequence of Series
+        All columns.
+    columns : dict
+        Those that are read.
+    """
+    unclear = [item for item in series if item.column not in columns.values()
+               and kinds_of(words := words_of(item.title)) <= {POSITION}
+               and not {*words} & (table.COMMANDS | table.FROM_OUTSIDE | table.SECONDARY)]
+    moving = {joint: item for joint, item in found.items() if np.ptp(item.values)}
+    later = {(joint, POSITION): other.column for joint, item in moving.items() for other in unclear
+             if measured(np.column_stack([item.values, other.values]), [[0], [1]])}
+    return later if len(later) == len(moving) else {}
 
 
 # ------------------------------------------------------------------------------------- time
@@ -329,28 +358,32 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
 
 
 def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array | None,
-                rate: float | None, stamp: Written, notes: list[str], model: DriveModel) -> Columns:
-    """Return columns without names: positions by derivatives, efforts by what explains them."""
+                rate: float | None, stamp: Written, notes: list[str], model: DriveModel,
+                known: Columns) -> Columns:
+    """Return columns without names: positions by derivatives, efforts by what explains them.
+
+    And those that are known by their names; these alone, if no others are efforts.
+    """
     count, is_titled = len(joints), bool(series[0].title)
     values = running_on(np.column_stack([item.values for item in series]))
     stamps = np.arange(len(values)) / (rate or 1.0) if time is None else time
-    # A column is what its name says, whatever its numbers look like.
-    found = [layout for layout in layouts(values, stamps, count) if not is_titled or (
-        EFFORT in layout.blocks and all(
-            may_be(series[place].title, kind) for kind, block in layout.blocks.items()
-            for place in block))]
-    if not found and is_titled:
-        return {}
-    if not found:
-        raise GuessError(
-            f'there is no header, and {len(series)} columns without time are no blocks of {count} '
-            f'joints ({", ".join(joints)}): give --drives with the joints that it has, or write '
-            f'columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} with numbers from 1')
 
     def read(blocks: Mapping[str, Sequence[int]]) -> Columns:
         return {(joint, kind): series[place].column for kind, places in blocks.items()
                 for joint, place in zip(joints, places, strict=False)}
 
+    # A column is what its name says, whatever its numbers look like.
+    found = [layout for layout in layouts(values, stamps, count) if not is_titled or (
+        EFFORT in layout.blocks and known.items() <= read(layout.blocks).items() and all(
+            may_be(series[place].title, kind) for kind, block in layout.blocks.items()
+            for place in block))]
+    if not found and is_titled:
+        return known
+    if not found:
+        raise GuessError(
+            f'there is no header, and {len(series)} columns without time are no blocks of {count} '
+            f'joints ({", ".join(joints)}): give --drives with the joints that it has, or write '
+            f'columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} with numbers from 1')
     fits: list[tuple[Fit, Layout]] = []
     most = -0.5 * table.SAMPLES * np.log(table.CLOSEST)
     for layout in found:
@@ -363,6 +396,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array | N
         fits.append((_fit(model, values, stamps / (ratio or 1.0), layout,
                           1.0 if time is None else None), layout))
     fits.sort(key=lambda pair: -pair[0].score)
+    if known and fits[0][0].residual > table.EXPLAINED:
+        return known
     copies = [pair for pair in fits if _are_alike(values, pair[1], fits[0][1])]
     # What was asked for has no noise, and is explained better than what was measured.
     noise = [roughness(values[:, other.blocks.get(EFFORT, other.blocks[POSITION])])
@@ -388,7 +423,8 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array | N
             f'there are positions of {count} joints, or positions and efforts of {count // 2} '
             f'(then give --drives {",".join(joints[:count // 2])})')
     columns = read(layout.blocks)
-    notes.append(f'no {"name of a position" if is_titled else "header"}: ' + '; '.join(
+    missing = ('name of an effort' if known else 'name of a position') if is_titled else 'header'
+    notes.append(f'no {missing}: ' + '; '.join(
         f'{table.PLURALS[kind]} are columns {", ".join(str(series[k].column) for k in places)}'
         for kind, places in layout.blocks.items()))
     return columns

@@ -191,6 +191,13 @@ class Evidence:
         doubt = float(np.linalg.norm(effort - factor * beyond)) / size
         return factor if abs(factor) > table.CERTAIN * doubt else np.nan
 
+    def factor_of_means(self, drive: int, column: int) -> float:
+        """Return the mean effort over the mean of a weight that hardly varies; NaN of another."""
+        root = self.roots[drive, column]
+        rigid, one = root[:, INERTIA] + root[:, GRAVITY], root[:, CONSTANT]
+        mean, size = float(one @ rigid), float(np.linalg.norm(one) * np.linalg.norm(rigid))
+        return float(one @ root[:, EFFORT]) / mean if abs(mean) > table.NEARLY * size else np.nan
+
 
 def _root(columns: Array, followed: NDArray[np.bool_], effort: Array) -> Array:
     """Return the triangle of the QR decomposition of columns and an effort where both are known."""

@@ -154,11 +154,12 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
     elif not np.all(np.isin(scales, table.SCALES)):
         listed = ', '.join(f'{scale:.3g} ({drive})' for drive, scale in zip(
             drives, scales, strict=True) if scale != 1)
-        gains = ', '.join(f'{1 / scale:.3g}' for scale in scales)
+        gains = '' if model.gain is None else (  # the paper's robot has none
+            ' (then write effort_kind: current, and under robot  gain: '
+            f'[{", ".join(f"{1 / scale:.3g}" for scale in scales)}])')
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
-           f'amperes (then write effort_kind: current, and under robot  gain: [{gains}]), '
-           'percent of a torque, or another unit')
+           f'amperes{gains}, percent of a torque, or another unit')
     else:
         for scale in dict.fromkeys(scales[scales != 1].tolist()):
             group = np.flatnonzero(scales == scale).tolist()
@@ -277,10 +278,29 @@ def _has_sign(effort: Array, bit: int) -> bool:
 # ------------------------------------------------------------------------------- measurements
 
 
-def knows_forces(model: DriveModel) -> bool:
+def knows_forces(model: DriveModel, recording: Recording) -> bool:
     """Return whether efforts are forces: currents without a gain and shares are none."""
-    return (model.effort_kind != recorded_names.CURRENT or model.knows_currents) and not any(
-        find_shares(model))
+    are_currents = model.effort_kind == recorded_names.CURRENT or recording.gain is not None
+    return (model.knows_currents or not are_currents) and not any(find_shares(model))
+
+
+def find_amperes(model: DriveModel, factors: Array) -> OtherReading:
+    """Return that efforts are currents, with the gain by the masses.
+
+    Parameters
+    ----------
+    model : DriveModel
+    factors : (D,) array
+        Of the model's inertia and weight in the efforts; NaN where they do not show.
+    """
+    unseen = tuple(np.flatnonzero(np.isnan(factors)).tolist())
+    gain = 'gain: [' + ', '.join('1.0' if np.isnan(factor) else f'{1 / abs(factor):.3g}'
+                                 for factor in factors) + ']'
+    return OtherReading.of(
+        'drive_constant', model.drives, range(len(factors)), 'the efforts are currents, and what '
+        f'an ampere gives is not known: by the masses {gain}' + (
+            f', but they do not show that of {named(model.drives, unseen)}' if unseen else ''),
+        f'under robot, {gain}')
 
 
 def find_shares(model: DriveModel) -> Iterator[OtherReading]:

@@ -89,7 +89,8 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
         COMMAND: 4.0, POSITION_ERROR: 3.0, WITHOUT_GRAVITY: 4.0, EXTERNAL: 4.0}
 UNLIKE_VELOCITY = 7.0  # of units of positions that suit no unit of the recorded velocities
 UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
-RARE = 4.0  # more, of micrometres: millimetres and kN are as likely
+RARE = 4.0  # more, of micrometres, as millimetres and kN are as likely, and of rates over 10 kHz
+SLOW = 12.0  # of times that make steps of a second or more
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 12.0  # of positions beyond a stroke, and far beyond it
@@ -330,7 +331,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
 
     for unit in times:
         add('time_unit', f'the times look like {TIMES[unit]}: as seconds they make the motion '
-            f'{1 / unit:.0f} times too slow for its efforts', (), time_unit=unit)
+            f'{1 / unit:.0f} times too slow', (), RARE * (unit != times[0]), time_unit=unit)
     angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
     for load in loads:
         add('load', '', (), load=load)
