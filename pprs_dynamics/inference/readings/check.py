@@ -110,11 +110,11 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     if excerpt is None:
         return tuple(find_shares(model))
     search = Search(model, recording, excerpt, is_first)
-    likely = search.likely()
+    likely = search.likely() or [Fit(search.rows[0])]
     if not search.explains and (found := tuple(find_motion(model, excerpt))):
         return found
     by_reading: list[list[Mistake]] = []
-    for fit in likely or [Fit(search.rows[0])]:
+    for fit in likely:
         said: list[Mistake] = [*findings_of(model, recording, fit.reading)]
         if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
             said += find_other_velocities(model, search.factors, fit.reading.time_unit)
@@ -134,7 +134,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     mistakes += shares
     evidence = search.evidence(search.rows[0])
     if not (search.has_gain or shares):
-        factors = search.effort_factors((likely or [Fit(search.rows[0])])[0].reading)
+        factors = search.effort_factors(likely[0].reading)
         # Without weight the inertia may be a guess: only a first model is asked about.
         if is_first or (evidence is not None and evidence.has_weight and np.any(
                 np.abs(np.log(np.abs(factors))) > np.log(table.OTHER_UNIT))):

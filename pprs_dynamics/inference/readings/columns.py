@@ -143,12 +143,11 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     titled = [item for item in left if item.title]
     main = quantity or POSITION
     columns = _by_names(titled, joints, quantity, others, notes) if titled else {}
-    by_numbers = False
+    kinds, by_numbers = {kind for _, kind in columns}, False
     if quantity and not titled:
         columns = {(joint, quantity): item.column
                    for joint, item in zip(joints, left, strict=False)}
-    elif model is not None and not ({kind for _, kind in columns} >= {main}
-                                    and {EFFORT, CURRENT} & {kind for _, kind in columns}):
+    elif model is not None and not (main in kinds and {EFFORT, CURRENT} & kinds):
         by_numbers = not columns
         columns = _by_numbers(left, joints, time, rate, stamp, notes, model, columns)
     found = {joint: by_column[column] for (joint, kind), column in columns.items() if kind == main}
