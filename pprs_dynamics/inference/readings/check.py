@@ -279,17 +279,19 @@ class Search:
             seed = self._top()
             mountings = mountings_in(self.model, self.excerpt(seed.reading), seed.reading)
             self._extend(seed, (*self.rows[1:], *mountings, *self._rates(seed.reading)), tried)
-            if not any(max(fit.residuals) < table.EXPLAINED for fit in self.fits if np.all(
-                    fit.reading.effort_scale == 1)):
+            if seed is start and not any(
+                    max(fit.residuals) < table.EXPLAINED for fit in self.fits if np.all(
+                        fit.reading.effort_scale == 1)):
                 self._extend(seed, pairs, tried)
         return self._top()
 
     def _extend(self, seed: Fit, rows: Sequence[Reading], tried: Collection[str]) -> None:
-        """Add the fits of a reading with each row of some kinds."""
+        """Add the fits of a reading with each row of some kinds, where they may become the best."""
+        least = self._top().score - table.SURE
         self.fits += [fit for row in rows
                       if row.kind in tried and self._may_follow(row, seed.reading)
                       for reading in self._after(row, seed.reading)
-                      for fit in self.fits_of(reading) if self._is_credible(row, fit)]
+                      for fit in self.fits_of(reading, least) if self._is_credible(row, fit)]
 
     def likely(self) -> list[Fit]:
         """Return the best reading where it is more likely than the plain one, and its rivals."""
@@ -415,8 +417,11 @@ class Search:
                 found.append(fit)
         return found[:1]
 
-    def fits_of(self, reading: Reading) -> list[Fit]:
-        """Return a reading with each scale that its efforts may have; none where it cannot be."""
+    def fits_of(self, reading: Reading, least: float = -np.inf) -> list[Fit]:
+        """Return a reading with each scale that its efforts may have.
+
+        None where it cannot be, or no coefficients give it a score of at least `least`.
+        """
         excerpt = self.excerpt(reading)
         if reading.kinds and not self._possible(reading):
             return []
@@ -430,7 +435,8 @@ class Search:
                 table.EXTERNAL][0]) and not evidence.has_weight):
             return []
         measured = self._measured(reading, excerpt, evidence)
-        if not measured:
+        if not measured or least > sum(
+                evidence.most(d, reading.efforts[d]) for d in measured) - cost:
             return []
 
         @cache

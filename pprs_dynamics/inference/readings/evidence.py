@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import comb
 from typing import Any, NamedTuple
 
@@ -32,6 +33,7 @@ from pprs_dynamics.physics.model.forces import RIGID_BODY
 CONDITION = 1e-6  # of a column among others: less is rounding
 # Columns of the regression of one drive; the effort is the last one.
 INERTIA, GRAVITY, OTHERS, VELOCITY, DIRECTION, CONSTANT, EFFORT = range(7)
+PRIORS = np.arange(9)  # places of coefficients, of which constants and weights have two signs
 
 
 class Likelihood(NamedTuple):
@@ -89,8 +91,8 @@ class Evidence:
         columns = np.stack([*forces, motion.velocity, direction, np.ones_like(position)], axis=2)
         force = forces.sum(axis=0)
         signs = np.sign(force) if reading.are_unsigned else np.ones_like(force)
-        roots = np.array([[_root(columns[:, d], followed[:, d], signs[:, d] * effort)
-                           for effort in excerpt.effort.T] for d in range(position.shape[1])])
+        roots = np.array([_roots(columns[:, d], followed[:, d], signs[:, d, None] * excerpt.effort)
+                          for d in range(position.shape[1])])
         samples, squares = (np.sum(roots[..., k] ** 2, axis=2) for k in (CONSTANT, EFFORT))
         swing = squares - np.sum(roots[..., CONSTANT] * roots[..., EFFORT], axis=2) ** 2 / (
             np.maximum(samples, 1))
@@ -98,7 +100,7 @@ class Evidence:
                    np.sqrt(np.nanmean(force ** 2, axis=0)), speed,
                    _balance(model, position[followed.all(axis=1)]))
 
-    @property
+    @cached_property
     def has_weight(self) -> bool:
         """Whether the model has any."""
         size = np.linalg.norm(self.roots[..., GRAVITY], axis=-1)
@@ -125,6 +127,12 @@ class Evidence:
         """Whether there are enough efforts for a regression."""
         return bool(round(self.count[drive, column]) >= EFFORT and self.total[drive, column] > 0)
 
+    def most(self, drive: int, column: int) -> float:
+        """Return a bound of the score and prior cost of efforts: with any coefficients [nats]."""
+        rest, swing = self.roots[drive, column, EFFORT, EFFORT] ** 2, self.swing[drive, column]
+        return max(-0.5 * table.SAMPLES * float(np.log(max(rest / swing, table.CLOSEST))),
+                   -table.MASSES_MOST)
+
     def likelihood(self, drive: int, column: int, scale: float, masses: float,
                    contains: tuple[int, ...] = (1, 1, 1, 1, 1)) -> Likelihood:
         """Return the log-likelihood that efforts are `scale` times those of a drive.
@@ -141,30 +149,36 @@ class Evidence:
         known = root[:, :CONSTANT] * (1, 1, *contains[2:])
         matrix = np.column_stack([known, root[:, CONSTANT], -root[:, CONSTANT],
                                   known[:, GRAVITY], -known[:, GRAVITY]])
-        target = root[:, EFFORT] / scale
         # Coefficients in units of the model's forces: mean and standard deviation of each.
         mean = np.array([*contains[:2], *[0.0] * 7])
         constant = table.CONSTANT * np.sqrt(total / count)
         apart = max(table.SAME_BALANCE, masses * float(np.sqrt(self.balance[drive] ** 2 - 1)))
         rigid = root[:, :2]
-        moves = np.linalg.norm(rigid, axis=0) > table.WEAK * np.linalg.norm(rigid)
+        sizes = np.sqrt(np.sum(rigid ** 2, axis=0))
+        moves = sizes > table.WEAK * np.sqrt(np.sum(sizes ** 2))
         of_rigid = np.where(lacks, table.LARGEST_COMPLIANCE, np.where(
             moves & (not self.has_weight), np.inf, masses))
         width = np.array([*of_rigid, *[np.inf] * 3, *[constant] * 2, *[apart] * 2])
+        with_priors = np.vstack([matrix, np.diag(width)])
+        target = np.concatenate([root[:, EFFORT] / scale, mean])
+        size = len(root)
         variance = total / count
         for _ in range(3):
             weight = np.sqrt(variance * count / table.SAMPLES) / width
-            found, _ = nnls(np.vstack([matrix, np.diag(weight)]),
-                            np.concatenate([target, weight * mean]))
-            rest = target - matrix @ found
-            variance = max(float(rest @ rest), table.CLOSEST * swing) / count
+            with_priors[size + PRIORS, PRIORS] = weight
+            target[size:] = weight * mean
+            found, _ = nnls(with_priors, target)
+            rest = target[:size] - matrix @ found
+            before, variance = variance, max(float(rest @ rest), table.CLOSEST * swing) / count
+            if variance == before:
+                break
         misfit = 0.5 * ((found - mean) / width) ** 2
         # Masses are off by factors.
         factors = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / masses) ** 2
         misfit[:2] = np.where(lacks, misfit[:2], np.minimum(factors, table.MASSES_MOST) * moves)
         cost = float(np.sum(misfit))
         # Friction beyond some times the rigid body's forces is unlikely.
-        friction, weight_of = (np.linalg.norm(force) + 1e-300 for force in (
+        friction, weight_of = (np.sqrt(force @ force) + 1e-300 for force in (
             matrix[:, OTHERS:CONSTANT] @ found[OTHERS:CONSTANT], rigid.sum(axis=1)))
         excess = float(np.log(friction / weight_of / table.FRICTION))
         cost += min(0.5 * max(excess, 0.0) ** 2, table.FRICTION_MOST)
@@ -199,11 +213,21 @@ class Evidence:
         return float(one @ root[:, EFFORT]) / mean if abs(mean) > table.NEARLY * size else np.nan
 
 
-def _root(columns: Array, followed: NDArray[np.bool_], effort: Array) -> Array:
-    """Return the triangle of the QR decomposition of columns and an effort where both are known."""
-    known = followed & np.isfinite(effort)
-    matrix = np.column_stack([columns[known], effort[known]])
-    return np.asarray(np.linalg.qr(np.vstack([matrix, np.zeros((7, 7))]), mode='r'))
+def _roots(columns: Array, followed: NDArray[np.bool_], efforts: Array) -> Array:
+    """Return triangles of the QR decomposition of columns and each effort where both are known."""
+    roots = np.zeros((efforts.shape[1], EFFORT + 1, EFFORT + 1))
+    groups: dict[bytes, list[int]] = {}
+    for k, known in enumerate((followed[:, None] & np.isfinite(efforts)).T):
+        groups.setdefault(known.tobytes(), []).append(k)
+    for pattern, places in groups.items():
+        rows, alike = np.frombuffer(pattern, dtype=bool), np.array(places)
+        matrix = np.column_stack([columns[rows], efforts[rows][:, alike]])
+        size = matrix.shape[1]
+        whole = np.asarray(np.linalg.qr(np.vstack([matrix, np.zeros((size, size))]), mode='r'))
+        roots[alike, :EFFORT, :EFFORT] = whole[:EFFORT, :EFFORT]
+        roots[alike, :EFFORT, EFFORT] = whole[:EFFORT, EFFORT:].T
+        roots[alike, EFFORT, EFFORT] = np.linalg.norm(whole[EFFORT:, EFFORT:], axis=0)
+    return roots
 
 
 def _balance(model: DriveModel, position: Array) -> Array:
