@@ -282,5 +282,5 @@ def test_an_oblique_mounting_is_no_other_unit_sign_or_zero(arm: DriveModel, degr
 
 def assert_gravity(line: str, x: float, z: float) -> None:
     """Assert that a line of a model file has a gravity, within 0.1 m/s²."""
-    (found,) = re.findall(r'robot: {gravity: \[(.*?)\]}', line)
+    (found,) = re.findall(r'under robot, gravity: \[(.*?)\]', line)
     np.testing.assert_allclose([float(value) for value in found.split(',')], (x, 0.0, z), atol=0.1)

@@ -227,6 +227,33 @@ def run_of_arm(size: float = 1.0, middle: float = 0.0) -> tuple[np.ndarray, ...]
     return time, q, v, arm_efforts(q, v, a) + random.normal(0, 0.03, q.shape)
 
 
+def test_of_two_topics_one_is_chosen_and_two_zeros_are_one_line(tmp_path: Path) -> None:
+    time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
+    effort = arm_efforts(q, v, a) + np.random.default_rng(4).normal(0, 0.03, q.shape)
+    (tmp_path / 'robot.urdf').write_text(ARM)
+    off, joints = np.array([np.pi / 2, -np.pi / 2]), ('shoulder', 'elbow')
+    write_bag(tmp_path / 'run.mcap', {
+        f'/{name}/joint_states': Samples(joints, time, position, None, effort)
+        for name, position in (('first', q), ('second', q - off))})
+    given = tmp_path / 'robot.urdf', [tmp_path / 'run.mcap'], tmp_path / 'robot.yaml'
+    with pytest.raises(PprsError, match='choose one with --topic'):
+        first_model(*given)
+    assert not first_model(*given, topic='/first/joint_states').questions
+    first = first_model(*given, topic='/second/joint_states')
+    (line,) = re.findall('write (columns: .*)', ' '.join(first.questions))
+    model = DriveModel.from_parameters(parse_parameters(f'{first.text}    {line}\n', 'robot.yaml'),
+                                       source=str(tmp_path / 'robot.yaml'))
+    found = read_recording(tmp_path / 'run.mcap', model.recorded, '/second/joint_states')
+    np.testing.assert_allclose(found.position, q, atol=1e-6)
+
+
+@pytest.mark.parametrize('head', ['time,q1,q2,tau1,tau2', 't,q1,q2,tau1,tau2'])
+def test_stamps_may_be_coarser_than_samples(head: str, tmp_path: Path) -> None:
+    time, q, v, a = motion(np.random.default_rng(5), 2, 1.0)
+    stamps = time - np.arange(len(time)) % 2 * time[1]
+    assert len(read_table(tmp_path, head, stamps, q, arm_efforts(q, v, a)).time) == len(time) // 2
+
+
 def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Recording:
     """Write a table, and return it as a first model reads it, without a question."""
     first = asked_about(folder, head, *columns, separator=separator)

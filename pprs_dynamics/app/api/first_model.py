@@ -25,7 +25,7 @@ from pprs_dynamics.inference.readings.columns import (
     GuessError,
     guess_columns,
 )
-from pprs_dynamics.inference.readings.findings import OtherReading, lines_of
+from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, lines_of
 from pprs_dynamics.inference.readings.names import joint_in, words_of
 from pprs_dynamics.inference.readings.table import (
     COMMANDS,
@@ -111,6 +111,8 @@ class FirstModel:
         Where a reading is not sure: lines, of which one is to be written.
     kinds : set of str
         Quantities that are recorded.
+    is_read : bool
+        Whether recordings can be read with it: not before it is decided what columns are.
     """
 
     robot: Path
@@ -127,6 +129,7 @@ class FirstModel:
     guessed: list[str] = field(default_factory=list)
     questions: list[str] = field(default_factory=list)
     kinds: set[str] = field(default_factory=set)
+    is_read: bool = True
 
     @property
     def has_efforts(self) -> bool:
@@ -171,7 +174,7 @@ class FirstModel:
 def first_model(
     robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
     output: str | os.PathLike[str] = 'robot.yaml', *, tool: str = '',
-    drives: Sequence[str] = (), rate: float | None = None,
+    drives: Sequence[str] = (), rate: float | None = None, topic: str | None = None,
 ) -> FirstModel:
     """Return a first model file of a robot.
 
@@ -190,6 +193,8 @@ def first_model(
         Driven joints; without, those of the recording, or all up to the tool.
     rate : float, optional
         Samples per second of tables without times [Hz].
+    topic : str, optional
+        Of joint states, if a bag has several.
 
     Raises
     ------
@@ -233,16 +238,17 @@ def first_model(
     if given:
         try:
             draft.columns, draft.guessed, draft.kinds = _columns(
-                given[0], files, contents, names, [*description.joints], draft.model, rate)
+                given[0], files, contents, names, [*description.joints], draft.model, rate,
+                topic)
         except AmbiguousColumns as error:
             notes.append(str(error))
             draft.questions += error.lines
-            draft.kinds = {EFFORT}  # a line says which
+            draft.kinds, draft.is_read = {EFFORT}, False  # a line says which
         except GuessError as error:
             raise GuessError(f'{given[0]}: {error}') from None
         notes += draft.guessed
     if given and not draft.questions:
-        notes += _correct(draft, given[0], rate)
+        notes += _correct(draft, given[0], rate, topic)
     if by_numbers:
         draft.questions.append(
             f'the joints of {given[0].name} are matched by their numbers alone: if it is a '
@@ -255,7 +261,7 @@ def first_model(
     return draft
 
 
-def _correct(draft: FirstModel, path: Path, rate: float | None) -> list[str]:
+def _correct(draft: FirstModel, path: Path, rate: float | None, topic: str | None) -> list[str]:
     """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
     A mistake of a drive that comes again after its correction is a question.
@@ -265,7 +271,7 @@ def _correct(draft: FirstModel, path: Path, rate: float | None) -> list[str]:
     while True:
         model = draft.model
         try:
-            recording = read_recording(path, model.recorded)
+            recording = read_recording(path, model.recorded, topic)
             mistakes = find_mistakes(model, recording, is_first=True)
         except PprsError as error:
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
@@ -280,10 +286,16 @@ def _correct(draft: FirstModel, path: Path, rate: float | None) -> list[str]:
                 and corrected.isdisjoint((reading.kind, drive) for drive, _, _ in reading.scales)]
         if not sure:
             # Lines for efforts that are no measurement are questions as well.
+            # What is written below `columns` is one line.
+            groups = [[mistake for mistake in mistakes if isinstance(mistake, Mistake)
+                       and mistake.scales]]
+            groups += [[mistake] for mistake in mistakes if mistake not in groups[0] and (
+                isinstance(mistake, OtherReading) or lines_of([mistake]))]
             draft.questions += [
-                mistake.what + ''.join(f': if so, write {line}' for line in lines_of(
-                    [mistake], bool(draft.columns)))
-                for mistake in mistakes if isinstance(mistake, OtherReading) or lines_of([mistake])]
+                ' and '.join(mistake.what for mistake in group)
+                + ''.join(f': if so, write {line}'
+                          for line in lines_of(group, bool(draft.columns)))
+                for group in groups if group]
             if not any(seen.kind.startswith(('effort', 'drive_constant')) for seen in readings):
                 draft.questions += _questions_of_names(draft)
             return notes + draft.questions
@@ -471,7 +483,7 @@ def _is_short_for(first: str, other: str) -> bool:
 
 
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Mapping[str, str],
-             movable: Sequence[str], model: DriveModel, rate: float | None,
+             movable: Sequence[str], model: DriveModel, rate: float | None, topic: str | None,
              ) -> tuple[dict[str, Any], list[str], set[str]]:
     """Return the content of `columns`, comments on guesses, and the recorded quantities."""
     kinds, drives = {*files}, model.drives
@@ -485,7 +497,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
         joints = tuple(names.get(name, name) for name in drives)
         try:
             recording = read_recording(path, RecordedDrives(
-                tuple(drives), joints, gain=(1.0,) * len(drives)))
+                tuple(drives), joints, gain=(1.0,) * len(drives)), topic)
             known = bool(np.isfinite(recording.effort).any())
             return {}, [], {EFFORT if recording.gain is None else CURRENT} if known else set()
         except UnreadableFileError:
@@ -513,12 +525,15 @@ def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: floa
                     movable: Sequence[str]) -> Guess:
     """Return the reading of columns in files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
-    guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
+    # Where a file has the times no other one needs a rate.
+    known = 1.0 if FILE_TIME in inside else rate
+    guesses = {kind: guess_columns(file.series, drives, kind, movable, known)
                for kind, file in inside.items() if kind != FILE_TIME}
     columns = {key: value for kind, guess in guesses.items()
                for key, value in guess.columns.items() if key[0] or kind == POSITION}
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
+        columns.pop(('', 'rate'), None)
         columns['', 'time'] = series[0].column if series else 1
     return Guess(columns, [f'{files[kind].name}: {note}' for kind, guess in guesses.items()
                            for note in guess.notes])

@@ -11,7 +11,14 @@ from shlex import quote
 from typing import TypedDict
 
 from pprs_dynamics.app.api.first_model import first_model
-from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file, write_json
+from pprs_dynamics.app.commands.arguments import (
+    MODEL,
+    UsageError,
+    add_shared,
+    number,
+    output_file,
+    write_json,
+)
 from pprs_dynamics.app.commands.info import mechanism_lines, show_recordings
 from pprs_dynamics.app.report.charts import recording_rows
 from pprs_dynamics.app.report.pictures import plot_over_time, save
@@ -54,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='recordings of this robot; the first gives the names of joints and '
                         'columns; files of one quantity each (q.csv tau.csv), or their folder, '
                         'count as one recording')
+    add_shared(parser, 'topic')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
@@ -76,25 +84,28 @@ def run(options: argparse.Namespace) -> int:
     if options.drives and not drives:
         raise UsageError(f'--drives is {displayed(options.drives)}, must name joints')
     first = first_model(options.robot, options.recordings, options.output,
-                        tool=options.tool, drives=drives, rate=options.rate)
+                        tool=options.tool, drives=drives, rate=options.rate,
+                        topic=options.topic)
     write_text(options.output, first.text)
     model = first.model
     for line in mechanism_lines(model):
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')
-    if model.recorded.columns is None and first.questions:
-        screen.print(NOT_SURE)
-        return 1
-    recordings, summaries = show_recordings(model, list(map(str, first.recordings)), None, screen)
+    recordings, summaries = show_recordings(
+        model, list(map(str, first.recordings)), options.topic, screen) if first.is_read else (
+            [], [])
     if options.picture and recordings:
         save(plot_over_time(recordings[0].time, recording_rows(recordings[0], model.units)),
              options.picture)
         screen.print(f'picture: {shown(options.picture)}', soft_wrap=True)
     screen.print(f'model: {shown(options.output)} (its comments list what was guessed)')
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
+    names += f' --topic {quote(options.topic)}' if options.topic else ''
     file = quote(options.output)
-    if first.has_efforts:
+    if first.questions:
+        screen.print(NOT_SURE)
+    elif first.has_efforts:
         screen.print('[bold]Next[/] Fit the model, then diagnose another run:')
         screen.print(shell_command(f'pprs fit {names} --model {file} --output base.yaml'))
         screen.print(shell_command(f'pprs diagnose {SECOND} --model base.yaml'))
@@ -106,6 +117,4 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, InitJson(notes=first.notes, drives=list(model.drives),
                                           recordings=summaries, questions=first.questions))
-    if first.questions:
-        screen.print(NOT_SURE)
     return 1 if first.questions else 0

@@ -43,7 +43,7 @@ from pprs_dynamics.inference.readings.findings import (
 from pprs_dynamics.inference.readings.links import velocity_links
 from pprs_dynamics.inference.readings.table import Reading, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
-from pprs_dynamics.measurement.files.defects import OTHER_UNIT_STEP, SLOW_STEP
+from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
@@ -562,7 +562,7 @@ class Search:
     def _slow(self, reading: Reading) -> float:
         """Return the cost of steps that cannot follow a robot, where another unit has others."""
         return table.SLOW * (len(self._excerpts) > 1 and (
-            self._step * reading.time_unit >= OTHER_UNIT_STEP))
+            self._step * reading.time_unit >= table.OTHER_TIME))
 
     def _against_velocities(self, reading: Reading) -> float:
         """Return the cost of times and positions that no unit of the recorded velocities suits."""

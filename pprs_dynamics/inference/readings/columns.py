@@ -249,14 +249,16 @@ def _time(series: Sequence[Series], has_rate: bool, notes: list[str],
           ) -> tuple[Array | None, Written]:
     """Return times [s] and the columns that have them."""
     rising = [item for item in series if _rises(item.values)]
-    named = [item for item in rising if item.title in TIME_COLUMNS]
+    # Stamps may be coarser than the samples.
+    named = [item for item in series if item.title in TIME_COLUMNS and _rises(item.values, True)]
     for whole, part in () if named else pairwise(series):
         if _counts_parts(whole.values, part.values):
             notes.append(f'column {part.column} has the fractions of the seconds in column '
                          f'{whole.column}')
             return whole.values + fraction_of_seconds(part.values), {
                 ('', 'time'): whole.column, ('', 'time_fraction'): part.column}
-    named = named or [item for item in rising if _is_time(words_of(item.title))]
+    named = named or [item for item in series
+                      if _is_time(words_of(item.title)) and _rises(item.values, True)]
     # Positions may rise as well: with a rate no column is needed.
     even = [] if has_rate or named else [
         item for item in rising if _is_even(item.values)
@@ -287,10 +289,11 @@ def _is_time(words: Sequence[str]) -> bool:
     return f'<{table.TIME}>' in units or bool(not units and {*words} & TIME_WORDS)
 
 
-def _rises(values: Array) -> bool:
+def _rises(values: Array, may_rest: bool = False) -> bool:
     steps = np.diff(values[np.isfinite(values)])
     # Episodes of a dataset begin again.
-    return bool(len(steps) > 2 and np.median(steps) > 0 and np.mean(steps > 0) > 0.95)
+    return bool(len(steps) > 2 and np.sum(steps) > 0 and np.mean(
+        (steps > 0) | ((steps == 0) & may_rest)) > 0.95)
 
 
 def _is_even(values: Array) -> bool:

@@ -112,7 +112,7 @@ def lines_of(findings: Iterable[Defect], has_columns: bool = False) -> list[str]
 def gravity_line(model: DriveModel, gravity: Array) -> str:
     """Return the line of a model file with gravity in the base, (3,) [m/s^2]."""
     line = f'gravity: [{", ".join(f"{value:g}" for value in gravity + 0.0)}]'
-    return f'robot: {{{line}}}' if gravity_key(model).startswith('robot') else line
+    return f'under robot, {line}' if gravity_key(model).startswith('robot') else line
 
 
 # -------------------------------------------------------------------------- of other readings

@@ -90,7 +90,8 @@ COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'positio
 UNLIKE_VELOCITY = 7.0  # of units of positions that suit no unit of the recorded velocities
 UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
 RARE = 4.0  # more, of micrometres, as millimetres and kN are as likely, and of rates over 10 kHz
-SLOW = 12.0  # of times that make steps of a second or more
+# Of times that make such steps [s], where another unit makes some of 10 us to 100 ms.
+OTHER_TIME, SLOW = 1.0, 12.0
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 12.0  # of positions beyond a stroke, and far beyond it

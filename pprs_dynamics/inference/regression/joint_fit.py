@@ -122,7 +122,8 @@ class Regression:
             what, rule = ('held poses', ', twice that for a fit') if least == LEAST_POSES else (
                 'samples after treatment', '')
             raise ResidualsError('measured', f'a drive has at most {most} {what}',
-                                 f'contain at least {least} of a drive{rule}')
+                                 f'contain at least {least} of a drive{rule}: record '
+                                 + ('more poses' if rule else 'a longer motion'))
         self.counts = np.stack([self.series[d].counts for d in self.drives])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}

@@ -282,10 +282,10 @@ def _chosen(bag: Bag, topic: str | None, drives: tuple[str, ...]) -> list[Connec
                              if item.msgtype.endswith('MultiArray')})
             raise UnreadableFileError(
                 path, f'there is no sensor_msgs/JointState on a topic ending in {TOPIC_END}'
-                + (f'; choose one of {", ".join(topics)} with topic' if topics else
+                + (f'; choose one of {", ".join(topics)} with --topic' if topics else
                    f'; of arrays write columns: {{DRIVE: {{position: "{arrays[0]}[0]"}}}} in the '
                    'model file' if arrays else ''))
     if len(matching) > 1:
         raise UnreadableFileError(
-            path, f'there are joint states on {", ".join(matching)}: choose one with topic')
+            path, f'there are joint states on {", ".join(matching)}: choose one with --topic')
     return topics[matching[0]]

@@ -35,10 +35,7 @@ SHORT_TIME = 1.0
 MOSTLY_SATURATED = 0.9
 # Median steps beyond this [s] cannot follow a robot.
 SLOW_STEP = 0.1
-# From this step [s] on stamps are rather of a smaller unit, in which the step is short enough.
-OTHER_UNIT_STEP = 1.0
 UNITS = {'position': 'm', 'velocity': 'm/s', 'effort': 'N'}  # of drives that push
-STAMP_UNITS = {'milliseconds': 1e3, 'microseconds': 1e6, 'nanoseconds': 1e9}
 
 
 class Judgement:
@@ -212,7 +209,7 @@ class Judgement:
         slow = [(place, step) for place, _, step, _ in spreads if step > SLOW_STEP]
         if slow:
             self._tell('slow_rate', len(slow),
-                       f'there is only one sample in {_slow(max(step for _, step in slow))}',
+                       f'there is only one sample in {max(step for _, step in slow):.4g} s',
                        [place for place, _ in slow])
 
     def _judge_efforts_and_velocities(self) -> None:
@@ -331,13 +328,3 @@ class Judgement:
 
     def _named(self, mask: Mask) -> list[str]:
         return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
-
-
-def _slow(step: float) -> str:
-    """Return a long step [s] in words, with the unit in which stamps of it rather are."""
-    if step >= OTHER_UNIT_STEP:
-        for unit, scale in STAMP_UNITS.items():
-            if step <= scale * SLOW_STEP:
-                return (f'{step:.4g} s, the stamps look like {unit} and must be divided by '
-                        f'{scale:.0e}')
-    return f'{step:.4g} s'

@@ -262,7 +262,7 @@ def _prefix(
         return ''
     if len(complete) > 1:
         raise UnreadableFileError(
-            path, f'there are the drives of {", ".join(complete)}: choose one with topic')
+            path, f'there are the drives of {", ".join(complete)}: choose one with --topic')
     return complete[0]
 
 
