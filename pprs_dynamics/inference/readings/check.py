@@ -268,12 +268,14 @@ class Search:
         self.explains = bool(explains and max(start.residuals) < table.EXPLAINED)
         tried = {'position_unit', 'drive_order'} if self.explains else {*table.COST} - (
             set() if self.has_gain else {'mounting', *table.LACKING})
-        # An arm that stands upright at the zeros of one file lies at those of another: of the two
-        # joints that differ each explains little alone.
+        # Of two zeros, or units, that are wrong each explains little alone: an arm that stands
+        # upright at the zeros of one file lies at those of another.
+        alone = [row for row in self.rows if row.kind in ('time_unit', 'position_offset')
+                 or self._is_unit_of_all(row)]
         pairs = [replace(second.after(first.after(self.rows[0])),
                          drives=first.drives + second.drives)
-                 for first, second in combinations(self._zeros(), 2)
-                 if first.drives != second.drives]
+                 for first, second in combinations(alone, 2)
+                 if (first.kind, first.drives) != (second.kind, second.drives)]
         seed = None
         while self._top() is not seed:
             seed = self._top()
@@ -299,7 +301,7 @@ class Search:
         is_good = best.residual <= table.GOOD_FIT or best.reading.is_no_measurement
         # Angles that explain the efforts are in the right unit, whatever limits say.
         is_right = is_good and not self._against_velocities(best.reading)
-        far = (self.reach(self.start.reading) > table.FAR) & [
+        far = (self.reach(self.start.reading) > (table.FAR if is_good else table.BEYOND)) & [
             not (is_right and units.turns) for units in self.model.units]
         if np.any(far) and (best.reading.is_plain or not is_good) and (units := [
                 unit for row in self.rows if row.kind == 'position_unit'
@@ -363,14 +365,15 @@ class Search:
         In another unit the zeros of positions may be off as well.
         """
         reading = row.after(before)
-        is_of_all = len(row.drives) == sum(units.turns for units in self.model.units)
-        zeros = [zero.after(reading) for zero in self._zeros()] if row.kind == 'position_unit' and (
-            not (self.fits_of(reading) if is_of_all else self._possible(reading))) else []
+        zeros = [zero.after(reading) for zero in self.rows if zero.kind == 'position_offset'] if (
+            row.kind == 'position_unit' and not (self.fits_of(reading) if self._is_unit_of_all(row)
+                                                 else self._possible(reading))) else []
         return [found for found in (reading, *zeros) if self._possible(found)]
 
-    def _zeros(self) -> list[Reading]:
-        """Return the rows in which the zero of one drive is off."""
-        return [row for row in self.rows if row.kind == 'position_offset']
+    def _is_unit_of_all(self, row: Reading) -> bool:
+        """Return whether the angles of all drives that turn are in another unit."""
+        return row.kind == 'position_unit' and len(row.drives) == sum(
+            units.turns for units in self.model.units)
 
     def _is_credible(self, row: Reading, fit: Fit) -> bool:
         # Symmetric robots fit nearly as well in another order of their drives.
