@@ -510,12 +510,14 @@ class Search:
         is_other = not reading.load and np.any(others) if self.is_first else (
             np.all(others) and len(known) >= min(2, len(factors)))
         if is_other and not any(off[unit] < table.OFF_IN_UNIT[unit][0] for unit in off):
-            # Others bear a weight that hardly changes, or are recorded like these.
-            of_means = np.array([evidence.factor_of_means(d, column)
-                                 for d, column in enumerate(reading.efforts.tolist())])
+            # Others bear a weight that hardly changes, or have a factor among the others.
+            of_means, doubtful = (np.array([factor(d, column, *errors) for d, column in enumerate(
+                reading.efforts.tolist())]) for factor, *errors in (
+                    (evidence.factor_of_means,), (evidence.factor, 0.0)))
             is_weight = (np.sign(of_means) == signs[0]) & (not reading.kinds)
-            yield (np.where(np.isin(drives, known), factors, np.where(
-                is_weight, of_means, np.median(factors[known]))),
+            among = np.clip(np.where(np.isnan(doubtful), np.median(factors[known]), doubtful),
+                            factors[known].min(), factors[known].max())
+            yield (np.where(np.isin(drives, known), factors, np.where(is_weight, of_means, among)),
                    _cost(signs[:1]) + (table.COST[table.POSITION_ERROR] if np.all(
                        sizes < table.LARGEST_COMPLIANCE) else self.cost_of_constants))
 

@@ -189,8 +189,8 @@ class Evidence:
         return Likelihood(score, max(fit, least) - score,
                           variance * count / float(np.sqrt(swing * total)))
 
-    def factor(self, drive: int, column: int) -> float:
-        """Return the factor of inertia and gravity in efforts; NaN where it is not certain."""
+    def factor(self, drive: int, column: int, errors: float = table.CERTAIN) -> float:
+        """Return the factor of inertia and gravity in efforts; NaN within some standard errors."""
         if not self.is_measured(drive, column):
             return np.nan
         root = self.roots[drive, column]
@@ -203,7 +203,7 @@ class Evidence:
             return np.nan
         factor = float(beyond @ effort) / size ** 2
         doubt = float(np.linalg.norm(effort - factor * beyond)) / size
-        return factor if abs(factor) > table.CERTAIN * doubt else np.nan
+        return factor if abs(factor) > errors * doubt else np.nan
 
     def factor_of_means(self, drive: int, column: int) -> float:
         """Return the mean effort over the mean of a weight that hardly varies; NaN of another."""
