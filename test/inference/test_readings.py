@@ -226,6 +226,14 @@ def test_two_zeros_that_are_off_are_found_together(zeros: tuple[int, int], arm: 
         90 * zero for zero in zeros]
 
 
+@pytest.mark.parametrize('seed', [3, 4])
+def test_two_units_and_a_zero_that_are_wrong_are_found_together(seed: int, arm: DriveModel) -> None:
+    time, q, _, effort = run(seed)
+    found = told(arm, 1e6 * time, np.degrees(q - (np.pi / 2, 0.0)), effort)
+    assert all(what in found for what in (
+        'like degrees', 'like microseconds', '90 degrees (shoulder)'))
+
+
 def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
     time, q, v, effort = run()
     (tmp_path / 'arm.urdf').write_text(ARM)
