@@ -254,6 +254,25 @@ def test_stamps_may_be_coarser_than_samples(head: str, tmp_path: Path) -> None:
     assert len(read_table(tmp_path, head, stamps, q, arm_efforts(q, v, a)).time) == len(time) // 2
 
 
+def test_a_title_with_another_unit_than_the_numbers_is_a_question(tmp_path: Path) -> None:
+    time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
+    effort = arm_efforts(q, v, a)
+    for title, is_asked in (('deg', True), ('rad', False)):
+        first = asked_about(tmp_path, f't,q1 [{title}],q2 [{title}],tau1,tau2', time, q, effort)
+        assert ('not in the unit of the title' in ''.join(first.questions)) == is_asked
+
+
+def test_efforts_that_were_asked_for_may_be_the_measured_ones(tmp_path: Path) -> None:
+    time, q, v, a = motion(np.random.default_rng(3), 2, 1.0)
+    effort = arm_efforts(q, v, a)
+    command = effort + np.array([0.9, 0.3]) * v
+    assert len(asked_about(tmp_path, '', time, q, v, command, effort).questions) == 2
+    named = asked_about(tmp_path, 't,q1,q2,dq1,dq2,tau_d1,tau_d2,tau_J1,tau_J2', time, q, v,
+                        command, effort)
+    assert [named.columns[joint]['effort'] for joint in ('shoulder', 'elbow')] == [
+        'tau_J1', 'tau_J2']
+
+
 def read_table(folder: Path, head: str, *columns: np.ndarray, separator: str = ',') -> Recording:
     """Write a table, and return it as a first model reads it, without a question."""
     first = asked_about(folder, head, *columns, separator=separator)

@@ -17,7 +17,7 @@ from made_up_files import ARM, SLIDE, arm_efforts, motion
 from pprs_dynamics.app.api.diagnose import diagnose
 from pprs_dynamics.app.api.first_model import FirstModel, first_model
 from pprs_dynamics.app.api.fit import fit
-from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
@@ -113,6 +113,16 @@ def first_of(folder: Path, urdf: str, *columns: np.ndarray) -> FirstModel:
     return first_model(folder / 'robot.urdf', [folder / 'run.csv'], folder / 'robot.yaml')
 
 
+def test_velocities_of_a_motor_in_another_unit_show_no_rate(tmp_path: Path) -> None:
+    (tmp_path / 'motor.urdf').write_text(MOTOR)
+    _, q, v, a = motion(np.random.default_rng(5), 1, 1.2)
+    np.savetxt(tmp_path / 'run.csv', np.column_stack([
+        np.degrees(q), v * 30 / np.pi, 0.003 * a + 0.01 * v]), delimiter=',', comments='',
+        header='angle,speed,torque')
+    with pytest.raises(PprsError, match='16.7 samples per second: give --rate'):
+        first_model(tmp_path / 'motor.urdf', [tmp_path / 'run.csv'], tmp_path / 'motor.yaml')
+
+
 @pytest.mark.parametrize('true', [1.0, 10.0])
 def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
     true: float, tmp_path: Path,
@@ -128,7 +138,7 @@ def test_the_inertia_of_a_motor_without_weight_is_no_unit_of_its_torque(
 
 @pytest.mark.parametrize(('factor', 'words'), [
     (-10.197, 'in kgf cm'), (11.0, 'in kgf cm'), (8.0, 'it looks like currents in amperes'),
-    (110.0, 'gain: [0.00909, '), (1e-3, 'in kN m')])
+    (150.0, 'gain: [0.00667, '), (101.0, 'in N cm'), (1e-3, 'in kN m')])
 def test_a_common_factor_is_a_unit_only_near_its_constant(
     arm: DriveModel, factor: float, words: str,
 ) -> None:

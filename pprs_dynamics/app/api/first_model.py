@@ -18,20 +18,21 @@ import numpy as np
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
-from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.check import find_mistakes, shows_weight
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
     Guess,
     GuessError,
     guess_columns,
 )
-from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, lines_of
+from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, lines_of, near
 from pprs_dynamics.inference.readings.names import joint_in, words_of
 from pprs_dynamics.inference.readings.table import (
     COMMANDS,
     CURRENT,
     EFFORT,
     POSITION,
+    USUAL_RATES,
     WORDS,
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
@@ -55,6 +56,7 @@ from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import as_yaml
 
 FILE_TIME = 'time'
+NO_TIMES = 'there is no column of times: give --rate HZ, the samples per second'
 SETTLED = ('position', 'velocity', 'effort', 'current')
 
 
@@ -241,6 +243,8 @@ def first_model(
                 given[0], files, contents, names, [*description.joints], draft.model, rate,
                 topic)
         except AmbiguousColumns as error:
+            if rate is None and not (error.has_times or contents.joints):
+                raise GuessError(f'{given[0]}: {NO_TIMES}') from None
             notes.append(str(error))
             draft.questions += error.lines
             draft.kinds, draft.is_read = {EFFORT}, False  # a line says which
@@ -277,11 +281,14 @@ def _correct(draft: FirstModel, path: Path, rate: float | None, topic: str | Non
             draft.questions.append(f'it was not checked how {path.name} is read: {error}')
             return notes + draft.questions
         readings = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
-        if rate is None and any(reading.kind == 'rate' for reading in readings) and (
-                'rate' in draft.columns):
+        by_velocities = draft.columns.get('rate') if rate is None else None
+        # Without weight any rate explains the efforts.
+        if by_velocities and (any(reading.kind == 'rate' for reading in readings) or not (
+                near(by_velocities, USUAL_RATES) or shows_weight(model, recording))):
             raise FirstModelError(
-                f'{path}: there is no column of times, and the recorded velocities are not in the '
-                'unit of the positions: give --rate HZ, the samples per second')
+                f'{path}: there is no column of times, and the recorded velocities are not surely '
+                f'in the unit of the positions, which would be {by_velocities:g} samples per '
+                'second: give --rate HZ')
         sure = [reading for reading in readings if reading.scales and reading.kind in SURE_KINDS
                 and corrected.isdisjoint((reading.kind, drive) for drive, _, _ in reading.scales)]
         if not sure:
@@ -514,8 +521,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: M
     elif all(str(series.column).startswith('/') for series in contents.series):  # of a bag
         found.pop('rate', None)
     elif 'time' not in found and 'rate' not in found:
-        raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
-                              'samples per second')
+        raise FirstModelError(f'{path}: {NO_TIMES}')
     if contents.decimal != '.':
         found['decimal'] = contents.decimal
     return found, guess.notes, kinds

@@ -30,8 +30,8 @@ from pprs_dynamics.system.plain_text import displayed
 
 EXAMPLE = 'pprs init ur10e.urdf run.csv --output robot.yaml'
 FASTEST = 1e6  # [Hz]
-NOT_SURE = ('[bold]Not sure[/]: the lines are comments in the model file; write what is true, or '
-            'go on with --as-it-is')
+NOT_SURE = ('[bold]Not sure[/]: the lines are comments in the model file; write what is true '
+            'there, or go on with compare, diagnose or fit and --as-it-is')
 
 
 class InitJson(TypedDict):
@@ -105,7 +105,8 @@ def run(options: argparse.Namespace) -> int:
     file = quote(options.output)
     if first.questions:
         screen.print(NOT_SURE)
-    elif first.has_efforts:
+    elif first.has_efforts and not any(
+            finding.kind == 'no_effort' for summary in summaries for finding in summary.findings):
         screen.print('[bold]Next[/] Fit the model, then diagnose another run:')
         screen.print(shell_command(f'pprs fit {names} --model {file} --output base.yaml'))
         screen.print(shell_command(f'pprs diagnose {SECOND} --model base.yaml'))

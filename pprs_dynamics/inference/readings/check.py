@@ -116,7 +116,7 @@ def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = Fals
     by_reading: list[list[Mistake]] = []
     for fit in likely:
         said: list[Mistake] = [*findings_of(model, recording, fit.reading)]
-        if {'position_unit', 'position_sign'}.isdisjoint(fit.reading.kinds):
+        if {'position_unit', 'position_title', 'position_sign'}.isdisjoint(fit.reading.kinds):
             said += find_other_velocities(model, search.factors, fit.reading.time_unit)
         by_reading.append(said)
     # What all of them say is no question.
@@ -150,6 +150,14 @@ def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, 
             for finding in (recording.findings if recording.checked_for is model
                             else find_mistakes(model, recording))
             if isinstance(finding, Mistake) for drive in finding.drives}
+
+
+def shows_weight(model: DriveModel, recording: Recording) -> bool:
+    """Return whether the drives of a recording bear a weight, which fixes units of motion."""
+    excerpt = excerpt_of(recording, table.STRETCHES)
+    evidence = None if excerpt is None else Evidence.of(
+        model, excerpt, Reading.plain(len(model.drives)))
+    return evidence is not None and evidence.has_weight
 
 
 class Search:
@@ -190,9 +198,10 @@ class Search:
         self.rows = readings(model.drives, model.units, self._loads(), [*self._excerpts][1:],
                              bool(np.all(recording.position[:, turning] % 1 == 0)),
                              not np.any(recording.effort < 0),
-                             [d for d, drive in enumerate(model.drives) if abs(
-                                 model.recorded.columns_of(drive).position_scale)
-                              in table.POSITION_UNITS])
+                             {d: scale for d, scale in enumerate(
+                                 model.recorded.columns_of(drive).position_scale
+                                 for drive in model.drives)
+                              if abs(scale) in table.POSITION_UNITS})
         # A gain that someone has checked may be wrong by a factor, a unit that nobody has checked
         # may be any.
         self.cost_of_constants = table.COST['drive_constant'] - table.UNCHECKED * is_first
@@ -496,8 +505,9 @@ class Search:
             np.arange(len(factors)), reading.efforts] > 0
         signs, sizes = np.sign(factors[known]), np.abs(factors[known])
         off = {unit: np.exp(np.abs(np.log(sizes / unit)).max(initial=0.0))
-               for unit in table.OFF_IN_UNIT if known and self.has_gain and (
-                   unit != table.KGF_CM or all(drive.turns for drive in self.model.units))}
+               for unit in table.OFF_IN_UNIT if known and self.has_gain and not (
+                   {unit} & {*table.OF_LENGTHS} if all(drive.turns for drive in self.model.units)
+                   else {unit} & {*table.OF_TURNS})}
         for scale in table.SCALES:
             unit = abs(scale)
             if unit == 1 or (unit in off and off[unit] < table.OFF_IN_UNIT[unit][1]):

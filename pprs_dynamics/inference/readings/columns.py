@@ -72,6 +72,7 @@ class AmbiguousColumns(GuessError):
     """
 
     def __init__(self, readings: Sequence[Written], what: str) -> None:
+        self.has_times = any(not drive for reading in readings for drive, _ in reading)
         self.lines = tuple(columns_line((*key, value) for key, value in reading.items())
                            for reading in readings)
         super().__init__(f'{what}, write one of them: {" or ".join(self.lines)}')
@@ -404,10 +405,14 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array | N
     # What was asked for has no noise, and is explained better than what was measured.
     noise = [roughness(values[:, other.blocks.get(EFFORT, other.blocks[POSITION])])
              for _, other in copies]
-    best, layout = next((pair for pair, own in zip(copies, noise, strict=True)
-                         if own > table.ROUGHER * noise[0]), copies[0])
+    rougher = [pair for pair, own in zip(copies, noise, strict=True)
+               if own > table.ROUGHER * noise[0]]
+    best, layout = (rougher or copies)[0]
+    # A share of the same numbers is no second reading.
+    settled = [other for _, other in copies if rougher or _are_alike(
+        values, other, layout, table.COPY)]
     # What a model explains as well may be the efforts, too; a thermometer is a constant.
-    rivals = [other for fit, other in fits if all(other is not copy for _, copy in copies) and (
+    rivals = [other for fit, other in fits if all(other is not one for one in settled) and (
         fit.score > best.score - table.SURE or best.residual > table.GOOD_FIT or (
             EFFORT in other.blocks and EFFORT in layout.blocks and fit.residual < table.EXPLAINED
             and other.blocks[POSITION] == layout.blocks[POSITION]
@@ -437,7 +442,7 @@ def _varies(values: Array) -> bool:
     return bool(np.any(np.std(values, axis=0) > table.STEADY * np.abs(np.mean(values, axis=0))))
 
 
-def _are_alike(values: Array, layout: Layout, other: Layout) -> bool:
+def _are_alike(values: Array, layout: Layout, other: Layout, least: float = table.ALIKE) -> bool:
     """Return whether two layouts have the same positions and efforts that are alike."""
     if layout is other or EFFORT not in layout.blocks or EFFORT not in other.blocks or (
             layout.blocks[POSITION] != other.blocks[POSITION]):
@@ -445,7 +450,7 @@ def _are_alike(values: Array, layout: Layout, other: Layout) -> bool:
     first, second = (np.concatenate([column - column.mean() for column in values[
         :, each.blocks[EFFORT]].T]) for each in (layout, other))
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return float(first @ second) > table.ALIKE * size
+    return float(first @ second) > least * size
 
 
 def _fit(model: DriveModel, values: Array, time: Array, layout: Layout, rate: float | None) -> Fit:

@@ -109,9 +109,14 @@ def lines_of(findings: Iterable[Defect], has_columns: bool = False) -> list[str]
     return [*filter(None, (first, *(mistake.line for mistake in mistakes)))]
 
 
+def _numbers(values: Array) -> str:
+    """Return a list of a model file, in which every number is a float."""
+    return as_yaml([float(f'{value:.3g}') for value in values])
+
+
 def gravity_line(model: DriveModel, gravity: Array) -> str:
     """Return the line of a model file with gravity in the base, (3,) [m/s^2]."""
-    line = f'gravity: [{", ".join(f"{value:g}" for value in gravity + 0.0)}]'
+    line = f'gravity: {_numbers(gravity + 0.0)}'
     return f'under robot, {line}' if gravity_key(model).startswith('robot') else line
 
 
@@ -156,7 +161,7 @@ def findings_of(model: DriveModel, recording: Recording, reading: Reading) -> li
             drives, scales, strict=True) if scale != 1)
         gains = '' if model.gain is None else (  # the paper's robot has none
             ' (then write effort_kind: current, and under robot  gain: '
-            f'[{", ".join(f"{1 / scale:.3g}" for scale in scales)}])')
+            f'{_numbers(1 / scales)})')
         of('drive_constant', np.flatnonzero(scales != 1).tolist(),
            f'is another multiple of what the masses need: {listed}: it looks like currents in '
            f'amperes{gains}, percent of a torque, or another unit')
@@ -294,8 +299,7 @@ def find_amperes(model: DriveModel, factors: Array) -> OtherReading:
         Of the model's inertia and weight in the efforts; NaN where they do not show.
     """
     unseen = tuple(np.flatnonzero(np.isnan(factors)).tolist())
-    gain = 'gain: [' + ', '.join('1.0' if np.isnan(factor) else f'{1 / abs(factor):.3g}'
-                                 for factor in factors) + ']'
+    gain = f'gain: {_numbers(1 / np.abs(np.where(np.isnan(factors), 1.0, factors)))}'
     return OtherReading.of(
         'drive_constant', model.drives, range(len(factors)), 'the efforts are currents, and what '
         f'an ampere gives is not known: by the masses {gain}' + (

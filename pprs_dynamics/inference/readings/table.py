@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 from typing import Any
@@ -36,12 +36,17 @@ POSITION_UNITS = frozenset((*LENGTHS, *ANGLES, *COUNTS))
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 # Given over true ones. At a lower rate inertia looks larger beside the weight, as rotors make it.
 RATES = (2.0, 5.0, 10.0)
-KGF_CM = 1 / 0.0980665
+# Samples per second of controllers and bus cycles.
+USUAL_RATES = (10.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0,
+               400.0, 500.0, 800.0, 1e3, 2e3, 2.5e3, 4e3, 5e3, 8e3, 1e4)
+KGF_CM, N_CM, KGF = 1 / 0.0980665, 100.0, 1 / 9.80665
+OF_TURNS, OF_LENGTHS = (KGF_CM, N_CM), (KGF,)  # of drives that turn, and that push
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
-EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm'}
+EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', KGF_CM: 'kgf cm', N_CM: 'N cm', KGF: 'kgf'}
 # Factors within which efforts are in such a unit and no currents, and may be in it: the compliance
 # of a controller, times N/m, is near kN, and drives of 0.08 to 0.12 N m/A are near kgf cm.
-OFF_IN_UNIT = {1e3: (3.0, 3.0), 1e-3: (1.5, 1.5), KGF_CM: (1.05, 1.2)}
+OFF_IN_UNIT = {1e3: (3.0, 3.0), 1e-3: (1.5, 1.5),
+               **dict.fromkeys((KGF_CM, N_CM, KGF), (1.05, 1.2))}
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 SIGN_BITS = range(7, 16)  # of magnitudes
 CALMER = 0.8  # changes where the bit does, over those of the numbers without a sign
@@ -83,10 +88,11 @@ REVERSAL = 0.03
 # Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
-COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
-        'effort_absolute': 6.0, 'load': 1.0, 'drive_constant': 10.0, 'velocity_unit': 6.0,
-        COMMAND: 4.0, POSITION_ERROR: 3.0, WITHOUT_GRAVITY: 4.0, EXTERNAL: 4.0}
+COST = {'position_unit': 6.0, 'position_title': 6.0, 'position_sign': 6.0, 'drive_order': 8.0,
+        'position_offset': 8.0, 'mounting': 8.0, 'time_unit': 6.0, 'rate': 6.0, 'effort_unit': 6.0,
+        'effort_sign': 6.0, 'effort_absolute': 6.0, 'load': 1.0, 'drive_constant': 10.0,
+        'velocity_unit': 6.0, COMMAND: 4.0, POSITION_ERROR: 3.0, WITHOUT_GRAVITY: 4.0,
+        EXTERNAL: 4.0}
 UNLIKE_VELOCITY = 7.0  # of units of positions that suit no unit of the recorded velocities
 UNCHECKED = 5.0  # less, of amperes where nobody has checked the unit
 RARE = 4.0  # more, of micrometres, as millimetres and kN are as likely, and of rates over 10 kHz
@@ -135,7 +141,7 @@ WORDS = {
     VELOCITY: ('velocity', 'velocities', 'vel', 'velo', 'dq', 'qd', 'qdot', 'dtheta', 'speed',
                'omega', 'qvel', 'dpos', 'v', 'thd', 'dth', 'drehzahl', 'geschwindigkeit'),
     EFFORT: ('effort', 'eff', 'tau', 'torque', 'trq', 'torq', 'force', 'moment', 'mom', 'load',
-             'tq', 'qfrc', 'u', 'kraft', 'drehmoment', 'f'),
+             'tq', 'tor', 'qfrc', 'u', 'kraft', 'drehmoment', 'f'),
     CURRENT: ('current', 'cur', 'curr', 'amp', 'ampere', 'i', 'iq', 'strom'),
     'temperature': ('temperature', 'temp'), 'pressure': ('pressure',),
 }
@@ -149,7 +155,7 @@ OTHERS = frozenset((
     'reward', 'index', 'episode', 'frame', 'done', 'tracking'))
 # Words of commands, which are read only where nothing is measured.
 COMMANDS = frozenset((
-    'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
+    'd', 'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded', 'ff',
     'feedforward'))
 # Words of external torques, as drivers estimate them: read where no other effort is recorded.
@@ -304,8 +310,8 @@ class Reading:
 
 
 def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequence[float],
-             times: Sequence[float], are_counts: bool, are_unsigned: bool, known: Collection[int],
-             ) -> list[Reading]:
+             times: Sequence[float], are_counts: bool, are_unsigned: bool,
+             known: Mapping[int, float]) -> list[Reading]:
     """Return the table of readings of D drives: first the plain one, other orders last.
 
     Parameters
@@ -318,8 +324,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
         Units in which times may be [s].
     are_counts, are_unsigned : bool
         Whether all angles are whole numbers, as encoders count, and no effort is below 0.
-    known : collection of int
-        Drives whose positions are read in a unit already.
+    known : mapping of int to float
+        Factors to SI of drives whose positions are read in a unit already.
     """
     every = tuple(range(len(drives)))
     same = np.arange(len(drives))
@@ -349,6 +355,11 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], loads: Sequen
                 if unit in COUNTS:
                     add('position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
                         few + 1, scale=scale, offset=-math.pi * np.isin(same, group))
+    for unit in dict.fromkeys(known.values()):
+        group = tuple(k for k in known if known[k] == unit)
+        name = 'radians' if units[group[0]].turns else 'metres'
+        add('position_title', f'the {_position(drives, group)} like {name}, not in the unit of '
+            'the title', group, scale=np.where(np.isin(same, group), 1 / unit, 1.0))
     # Angles in degrees together with lengths in millimetres: neither alone explains efforts.
     alone = [row for row in rows if row.kind == 'position_unit']
     rows += [second.after(first.after(rows[0])) for first, second in combinations(alone, 2)
