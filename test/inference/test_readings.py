@@ -119,7 +119,7 @@ def test_velocities_of_a_motor_in_another_unit_show_no_rate(tmp_path: Path) -> N
     np.savetxt(tmp_path / 'run.csv', np.column_stack([
         np.degrees(q), v * 30 / np.pi, 0.003 * a + 0.01 * v]), delimiter=',', comments='',
         header='angle,speed,torque')
-    with pytest.raises(PprsError, match='16.7 samples per second: give --rate'):
+    with pytest.raises(PprsError, match=r'16\.7 samples per second: give --rate'):
         first_model(tmp_path / 'motor.urdf', [tmp_path / 'run.csv'], tmp_path / 'motor.yaml')
 
 

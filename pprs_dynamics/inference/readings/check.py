@@ -89,7 +89,7 @@ def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False)
     if refuse and others:
         raise MisreadError(recording.name, [other.what for other in others],
                            lines_of(others, model.recorded.columns is not None))
-    return replace(recording, findings=(*mistakes, *recording.findings), checked_for=model)
+    return replace(recording, findings=(*recording.findings, *mistakes), checked_for=model)
 
 
 def find_mistakes(model: DriveModel, recording: Recording, is_first: bool = False,

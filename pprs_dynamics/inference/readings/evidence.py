@@ -159,7 +159,7 @@ class Evidence:
         of_rigid = np.where(lacks, table.LARGEST_COMPLIANCE, np.where(
             moves & (not self.has_weight), np.inf, masses))
         width = np.array([*of_rigid, *[np.inf] * 3, *[constant] * 2, *[apart] * 2])
-        with_priors = np.vstack([matrix, np.diag(width)])
+        with_priors = np.vstack([matrix, np.zeros((len(width), len(width)))])
         target = np.concatenate([root[:, EFFORT] / scale, mean])
         size = len(root)
         variance = total / count

@@ -109,14 +109,14 @@ def lines_of(findings: Iterable[Defect], has_columns: bool = False) -> list[str]
     return [*filter(None, (first, *(mistake.line for mistake in mistakes)))]
 
 
-def _numbers(values: Array) -> str:
+def _numbers(values: Array, digits: int = 3) -> str:
     """Return a list of a model file, in which every number is a float."""
-    return as_yaml([float(f'{value:.3g}') for value in values])
+    return as_yaml([float(f'{value:.{digits}g}') for value in values])
 
 
 def gravity_line(model: DriveModel, gravity: Array) -> str:
     """Return the line of a model file with gravity in the base, (3,) [m/s^2]."""
-    line = f'gravity: {_numbers(gravity + 0.0)}'
+    line = f'gravity: {_numbers(gravity + 0.0, 6)}'
     return f'under robot, {line}' if gravity_key(model).startswith('robot') else line
 
 
