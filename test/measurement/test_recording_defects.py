@@ -171,10 +171,8 @@ def test_gaps_split_and_lost_samples_do_not() -> None:
     assert recording.segments == (slice(0, 688), slice(688, 978))
 
 
-@pytest.mark.parametrize(('unit', 'scale'), [('milliseconds', 1e3), ('nanoseconds', 1e9)])
-def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
-    unit: str, scale: float, tmp_path: Path,
-) -> None:
+@pytest.mark.parametrize('scale', [1e3, 1e9])
+def test_stamps_of_another_unit_are_read_as_they_are(scale: float, tmp_path: Path) -> None:
     arrays = made.measured(1001)
     stamps = np.rint(scale * arrays['time']).astype(np.int64)
     header = ['time', *(f'{drive}/position' for drive in DRIVES)]
@@ -187,7 +185,7 @@ def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
     assert recording.time[-1] - recording.time[0] == pytest.approx(
         scale * arrays['time'][-1], rel=1e-6)
     slow, = (finding for finding in recording.findings if finding.kind == 'slow_rate')
-    assert unit in slow.text
+    assert f'only one sample in {0.002 * scale:.4g} s' in slow.text
 
 
 def test_what_pandas_has_for_missing_values_counts_as_missing() -> None:
