@@ -40,5 +40,5 @@ def test_a_node_that_stood_still_executes_nothing_of_what_waited(ros_domain: int
     for stream in (found['stamped'], found['unstamped']):
         assert stream['back_after_s'] < stall.AFTER, found
         assert stream['old_commands'] == 0, found
-        # It stood, and later messages took the place of some five hundred.
-        assert stream['superseded'] > 200, found
+        # It stood: later messages took the place of some five hundred, fewer from a busy sender.
+        assert stream['superseded'] > 100, found
